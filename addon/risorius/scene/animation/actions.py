@@ -19,11 +19,11 @@ from ...logic.animation import track_matching
 from ..base import compat, saved
 from ..base.blender_types import Animated
 
-BEFORE = "risorius_before"  # on a datablock with a baked action: its earlier animation
+BEFORE = "risorius_before"  # on a datablock with a baked action: its animation before the bake
 BAKED_ACTION = "risorius_baked_action"  # marks a baked action, which `restore` removes
 _DIGEST = "risorius_digest"  # on a baked action: digest of its keys after the bake
 _LINEAR = 1  # number of Blender's interpolation "LINEAR"
-_AT_ONCE = 1 << 21  # values (frames times columns) that are reduced in one call
+_AT_ONCE = 1 << 21  # approximate number of values (frames times columns) reduced in one call
 
 
 @dataclass
@@ -34,8 +34,8 @@ class Track:
         path: data path of the property.
         group: name of the group of its F-curves.
         values: float32[frames, width], the components of the property at each frame.
-        now: float[width], current value of the property in the scene. A property that has this
-            value at all frames needs no curve. None: always make a curve.
+        now: float[width], current value of the property in the scene. `write` makes no curve of a
+            property that has this value at all frames. None: always make a curve.
         first: array index that the first column of values animates.
         indexed: whether the property is an array.
     """
@@ -203,7 +203,7 @@ def play(
     muted: Collection[str] = (),
     strip: bool = False,
 ) -> None:
-    """Let a datablock play a baked action and no other animation.
+    """Let a datablock play a baked action and no other action or NLA strip.
 
     The earlier animation of the datablock is stored for `restore`.
 
@@ -211,7 +211,7 @@ def play(
         owner: object or shape keys that play the action.
         action, slot: the results of `write`.
         muted: data paths of baked properties, whose drivers are muted.
-        strip: put the action on a new NLA track instead of making it the active one.
+        strip: put the action on a new NLA track instead of making it the active action.
     """
     keep(owner)
     data = owner.animation_data
@@ -437,7 +437,8 @@ def _baked_strips(
 ) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
     """The NLA strips that play the baked action, each with its track.
 
-    Strips and tracks that the user renamed or moved are found too.
+    Strips and tracks that the user renamed or moved are found too. If no strip plays the stored
+    action, strips of other baked actions on the track with the stored name are found.
     """
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
     baked = state.get("baked")

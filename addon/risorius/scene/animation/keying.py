@@ -162,7 +162,8 @@ def by_hand(
         context: has the settings and the current frame.
         rig: the character.
         move: a function that moves sliders and bones from their current values. It returns the
-            names of all sliders that it set, even to equal values; None if it did nothing.
+            names of all sliders that it set, even to equal values; None if it did nothing. At the
+            current frame, a slider that was set to an equal value is keyed if it has an F-curve.
         at_selected: True: move at every frame with a selected key of this face, and key all
             changes; False: move at the current frame.
         at: a function that is called before each move; its argument is the frame of the move.
@@ -430,7 +431,7 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of the newest key of a curve with at most two keys."""
+    """Set interpolation and handle types of the last key in time, if a curve has at most two."""
     if len(curve.keyframe_points) > 2:
         return  # Blender copied them from the previous key
     for key in (

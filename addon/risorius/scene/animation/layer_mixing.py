@@ -146,7 +146,8 @@ def mix(
         maximum: largest value of a slider.
 
     Returns:
-        float32[R] slider values and control bones with the layers applied.
+        float32[R] slider values and control bones with the layers applied; `raw` and `bones`
+        themselves if the character has no layer or its controls are baked.
     """
     controls = seen.original
     if not layers.has_any(controls) or parts.BAKED in controls:

@@ -22,7 +22,8 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     """Convert layers to strips, bottom to top, up to the first layer that no strip can represent.
 
     This layer and all layers above it stay, because Blender evaluates the NLA before all layers.
-    Converted layers are muted. The active action becomes the lowest new strip.
+    Muted layers are skipped, and beside solo layers all others. Converted layers are muted. The
+    active action becomes the lowest new strip.
 
     Args:
         scene: gives the frame rate.
@@ -66,7 +67,7 @@ def obstacle(
     Args:
         controls: control armature.
         layer: settings of a layer.
-        curve: the F-curve of its weight, or None.
+        curve: the F-curve of the layer's weight, or None.
     """
     fades = layer.fade_in or layer.fade_out
     reasons = (

@@ -123,7 +123,7 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
     Args:
         controls: the control armature.
         first, last: first and last frame of the tweak.
-        fade: length of the fade at each end in frames.
+        fade: length of the fade at each end in frames; at most half the range is used.
 
     Raises:
         FaceError: the range is shorter than two frames, or the fade is negative.
@@ -387,7 +387,8 @@ def put(controls: ArmatureObject, stand: Stand) -> None:
 def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
     """The pose of the controls without the tweak.
 
-    On a face with NLA strips, Blender evaluates the pose in a separate dependency graph.
+    On a face with NLA strips or a blended active action, Blender evaluates the pose in a separate
+    dependency graph.
 
     Args:
         controls: the control armature.

@@ -17,8 +17,8 @@ Progress = Callable[[float], None]
 Cancelled = Callable[[], bool]
 
 FIT, JOINTS = "FIT", "JOINTS"  # stages of a task
-_FITTED = 0.6  # share of the total time after which the head has its expressions
-_CARRIED = 0.9  # of that, at the end of the transfer of expressions
+_FITTED = 0.6  # progress of the whole task when stage FIT ends: the head has its expressions
+_CARRIED = 0.9  # progress of stage FIT when the transfer of expressions ends
 
 
 class HeadTask(Task[Result], Generic[Result]):

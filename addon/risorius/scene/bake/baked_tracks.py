@@ -62,7 +62,8 @@ def rig_tracks(
         target: the armature that will play the tracks: a copy of the rig; None: the rig.
 
     Returns:
-        Tracks of bones, animated maps, blend shape channels, and other animated properties.
+        Tracks of bones, animated maps, blend shape channels that the user's drivers read, the
+        object transform, and other properties that the user animates.
     """
     target = target or rig
     found = {t.path: t for t in _others(samples.others.get(rig, {}), rig)}
@@ -86,7 +87,7 @@ def _is_array(path: str) -> bool:
 
 
 def _others(values: Mapping[str, list[list[float]]], owner: bpy.types.ID) -> Iterator[Track]:
-    """Tracks of sampled properties that the user animates and the rig does not compute."""
+    """A track for each sampled property. Args: values  data path -> components at each frame."""
     for path, rows in values.items():
         group = path.split('"')[1] if '"' in path else "Object Transforms"
         indexed = len(rows[0]) > 1
@@ -172,7 +173,8 @@ def _array(
 ) -> list[Track]:
     """Tracks of an array property, one for each of the given indices; None: all indices.
 
-    The property gets the values of the first frame.
+    The property gets the values of the first frame. Empty if the property has another length than
+    `values` has columns.
     """
     if len(target.get(name, ())) != values.shape[1] or not values.shape[1]:
         return []
@@ -237,8 +239,8 @@ def control_tracks(
         samples: inputs of the face, from sampling.sample.
 
     Returns:
-        Tracks. `actions.write` makes no curve for a slider that always has its rest value, or for a
-        property of a bone that always has its current value.
+        Tracks. `actions.write` makes no curve for a slider that has its rest value now and at all
+        frames, or for a property of a bone that has its current value at all frames.
     """
     face = controls.pose.bones[parts.FACE]
     found = {t.path: t for t in _others(samples.others.get(controls, {}), controls)}

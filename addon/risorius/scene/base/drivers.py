@@ -58,6 +58,9 @@ class Entries:
     Args:
         rig: deforming armature.
         labels: "channels" and "maps" -> (labels in the old order, labels in the new order).
+
+    Attributes:
+        gone: old labels of channels and maps that drivers read and the new order lacks.
     """
 
     def __init__(

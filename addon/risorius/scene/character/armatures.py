@@ -178,10 +178,10 @@ def build_rig(
 
 
 def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Add drivers to the rig so that Blender evaluates the controls even if they are hidden.
+    """Add a driver to the rig so that Blender evaluates the controls even if they are hidden.
 
     Blender skips hidden objects that no visible object depends on, and the face would not move. The
-    drivers read each control bone, because Blender evaluates a bone of a hidden armature only if
+    driver reads each control bone, because Blender evaluates a bone of a hidden armature only if
     something visible depends on this bone.
 
     Args:

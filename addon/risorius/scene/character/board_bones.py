@@ -27,8 +27,8 @@ from . import armatures, board, bone_shapes, runtime
 
 COLLECTION = "Face Board"
 BORDER, FRAMES = runtime.BOARD_BONES
-_SHARE = 1.3  # height of the board divided by the size of the head
-_AWAY = 0.42  # distance from the head to the board divided by the size of the head
+_SHARE = 1.3  # height of a complete board / largest extent of the meshes and joints of the face
+_AWAY = 0.42  # distance from the face to a complete board / the same extent
 _SIDE_COLOURS = {"L": (0.25, 0.6, 1.0), "R": (1.0, 0.35, 0.3), "": (1.0, 0.8, 0.2)}
 _LINE_COLOUR = (0.8, 0.8, 0.82)
 _BORDER_COLOUR = (0.25, 0.75, 0.45)

@@ -29,7 +29,7 @@ _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
 _KEY_VALUE = re.compile(r'^key_blocks\["(.*)"\]\.value$')
 _LIVE_MARK = "KEY_BSPLINE"  # interpolation that marks the live key
 
-Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
+Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, offsets [K, 3]
 
 
 # Session uids of mesh objects that were not edited since they were built, so that their skin

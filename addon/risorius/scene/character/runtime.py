@@ -156,7 +156,8 @@ class Turning:
         share: fraction of the control bone's rotation that the joint gets, 0 to 1.
         armature_axes: matrix that converts the vector part of a quaternion from the armature's
             axes to the file's.
-        bone_axes: matrix that converts it from the axes of the joint's bone to the file's.
+        bone_axes: matrix that converts the vector part from the axes of the joint's bone to the
+            file's.
     """
 
     joint: int

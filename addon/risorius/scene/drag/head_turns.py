@@ -27,7 +27,7 @@ _LAST = (0.0, 0.0, 0.0, 1.0)  # row of an affine matrix
 class HeadTurns:
     """Head and joint motions that the raw controls do not contain, at one moment.
 
-    It refers to Blender objects, so it must not outlive the operator that creates it.
+    The instance refers to Blender objects, so it must not outlive the operator that creates it.
     """
 
     def __init__(

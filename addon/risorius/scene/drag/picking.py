@@ -25,8 +25,8 @@ from . import handles
 from .head_turns import HeadTurns
 from .skin import Point, Skin
 
-_FAR = 0.05  # of the face's size: a hit farther from all vertices does not count as this face
-NEAR = 0.06  # of the face's size: a handle farther from the hit surface counts as occluded
+_FAR = 0.05  # largest distance of a hit from the nearest vertex / size of the face
+NEAR = 0.06  # largest distance of an unoccluded handle from the hit / size of the face
 _THROUGH = 16  # largest number of wire or bounds objects that a ray passes
 
 
@@ -48,7 +48,10 @@ class Hit:
 
 
 def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
-    """The vertex at which a ray meets a face; None if it first meets another object or nothing.
+    """The vertex at which a ray meets a face.
+
+    None if the ray meets nothing, or first another object, an instance of a face, a mesh of another
+    level of detail, or a place far from all vertices.
 
     Args:
         context: its evaluated scene is searched.

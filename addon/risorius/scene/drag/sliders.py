@@ -35,7 +35,8 @@ class Sliders:
         start: float64[R], values of the sliders; if the face board leads, the values that the
             board gives them.
         seen: float32[R], the raw controls of the face, with layers and eye bones.
-        gain: float64[R], change of a raw control divided by the change of its slider.
+        gain: float64[R], change of a raw control divided by the change of its slider; 1 if this
+            is too small for a drag.
         free: bool[R], sliders that can move.
         low, high: float64[R], the limits of `seen`.
         linked: (index of a slider, index of the slider on the other side that follows it).

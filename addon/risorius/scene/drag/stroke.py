@@ -30,8 +30,8 @@ from .skin import Point, Skin
 
 Float = NDArray[np.float64]
 
-_STILL = 1e-6  # of the face's size: smaller motions of a point by a control are ignored
-_SMALL = 0.02  # of the largest change of a control: smaller changes are not keyed
+_STILL = 1e-6  # least motion of a point by a control at value 1 / size of the face
+_SMALL = 0.02  # least change of a control that is kept / largest change of a control
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class _Anchors:
 class Stroke:
     """A running drag. `begin` makes it; `finish` or `restore` ends it.
 
-    It refers to Blender objects, so it must not outlive the operator that creates it.
+    A Stroke refers to Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
         rig, live: the character and its Runtime.
@@ -137,7 +137,7 @@ class Stroke:
         return at
 
     def finish(self, context: Context, target: Float, view: Float | None = None) -> list[str]:
-        """Move the point to its target, and insert keys.
+        """Move the point to its target, and insert keys if auto-key or a tweak is on.
 
         Controls that changed very little during the drag are reset to their values before the drag.
 
@@ -180,7 +180,10 @@ class Stroke:
         self.skin.show(context)
 
     def moved(self, count: int = 3) -> list[tuple[str, float]]:
-        """(name, change since the press) of the `count` controls that changed most."""
+        """(name, change since the press) of the `count` controls that changed most.
+
+        Controls that changed by 0.001 or less are left out.
+        """
         change = (self.raw - self.state.seen).astype(np.float64)
         order = np.argsort(-np.abs(change), kind="stable")[:count]
         return [(self.live.labels[i], float(change[i])) for i in order if abs(change[i]) > 1e-3]

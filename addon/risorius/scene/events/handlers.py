@@ -106,7 +106,7 @@ def _render_ended(*_arguments: object) -> None:
 
 @persistent
 def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
-    """React to edits. Tag no control armature, because that would trigger this handler again."""
+    """React to edits. A control armature is tagged only after a repair: tags call this again."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     joint_readings.note_edit()
@@ -196,7 +196,9 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters to evaluate, because their controls, their body or the camera was updated.
+    """The characters to evaluate after an update.
+
+    Their armatures, their body, an action of one of their layers, or the camera was updated.
 
     The body of a character is the armature to which its face is attached.
     """

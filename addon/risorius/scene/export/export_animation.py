@@ -318,7 +318,8 @@ def clip(
         maps: add the values of the animated maps, by their names in the DNA.
 
     Returns:
-        A clip with names of the DNA file (Blender's name if a name occurs twice in the file).
+        A clip with names of the DNA file for controls and maps, and names such as "head.yaw". A
+        control whose name occurred before in the file has Blender's name.
     """
     live, names = runtime.there(rig), []
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):

@@ -48,7 +48,7 @@ class _Flat:
         name: name of the user's material before the export.
         work: a copy for baking; None if the material has no nodes.
         users: (mesh object, slot number) with this material.
-        shader: the shader node of the copy; None for a transparent film.
+        shader: the shader node of the copy; None for a transparent film or without nodes.
         clear: True: the material is transparent in places.
         sources: input "color", "alpha" or "roughness" -> shader_inputs.Source.
         images: input -> reused or baked image, including "normal".
@@ -81,7 +81,8 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
         The progress, 0 to 1.
 
     Raises:
-        FaceError: Cycles is missing, or a mesh already has the maximum of eight UV maps.
+        FaceError: Cycles is missing, a mesh already has the maximum of eight UV maps, or the file
+            of a reused image is missing.
     """
     items = [o for o in override["scene"].objects if o.type == "MESH"]
     for item in items:

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SIZE = 160  # width and height of a picture in pixels
-VERSION = 1  # of the drawing code; cached pictures of other versions are not used
+VERSION = 1  # version of the drawing code; cached pictures of other versions are not used
 _SMOOTH = 2  # samples per pixel in each direction
 _KEY = np.array([-0.45, 0.55, 0.70])  # direction to the key light at the upper left
 _FILL = np.array([0.75, 0.05, 0.65])  # direction to the fill light
