@@ -285,7 +285,14 @@ class _Job:
 def _normalised(
     present: skin_weights.Weights, known: Iterable[str], ours: Mapping[str, int], vertex: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Joints and weights of a vertex, with the largest weight first and a sum of 1."""
+    """Joints and weights of a vertex, with the largest weight first and a sum of 1.
+
+    Args:
+        present: weights of the mesh object.
+        known: vertex groups of the object that belong to joints.
+        ours: name of a vertex group -> joint index.
+        vertex: index of the vertex.
+    """
     held = [(present[n][vertex], ours[n]) for n in known if present[n].get(vertex, 0.0) > 0.0]
     held.sort(key=lambda pair: (-pair[0], pair[1]))
     total = sum(weight for weight, _ in held)

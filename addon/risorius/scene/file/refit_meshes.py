@@ -295,7 +295,10 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
 def _refit_weights(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan
 ) -> None:
-    """Write the new file's skin weights, except at vertices that the user painted."""
+    """Write the new file's skin weights, except at vertices that the user painted.
+
+    Vertex groups that modifiers or shape keys use do not change.
+    """
     before = skin_weights.file_pairs(old, change.old_bones)
     after = skin_weights.file_pairs(new, change.new_bones)
     if before == after:

@@ -52,7 +52,7 @@ def replace_file(
 
     Raises:
         ReplaceError: the character cannot be changed now.
-        DnaError, PlanError, SpaceError: the file cannot be used; nothing was changed.
+        OSError, DnaError, PlanError, SpaceError: the file cannot be used; nothing was changed.
     """
     _check(rig)
     with armatures.kept_selection(context):
@@ -296,6 +296,8 @@ def _renew_board(
     places: Mapping[str, tuple[float, ...]],
 ) -> None:
     """Build a face board for the new file; handles with the same names keep their location.
+
+    Nothing changes if there was no board, or if both files have the same handles.
 
     Args:
         context: with a view layer.

@@ -135,6 +135,8 @@ def _axes(context: Context) -> Doubles:
 def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
     """The neutral mesh of an object without its shape keys; its Mirror modifiers are applied.
 
+    If it has a Mirror modifier, its shape keys are included at their current values.
+
     Args:
         context, item, head: see part_of.
     """

@@ -218,7 +218,8 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
         moment: the moment of the update.
 
     Returns:
-        Whether a changed pose was written.
+        Whether the pose was written; False if its inputs are unchanged and the moment is not ANEW,
+        or if Blender refused the bones.
     """
     times = [perf_counter()]
     controls = None if parts.BAKED in rig else parts.controls_of(rig)  # baked: its actions move it

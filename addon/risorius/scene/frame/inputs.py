@@ -34,7 +34,8 @@ def read_inputs(
         seen: the evaluated control armature object.
         live: the character's Runtime.
         depsgraph: graph with the bones of the body to which the face may be attached.
-        maximum: upper limit of the sliders, and of look controls after adding the eye bones.
+        maximum: upper limit of sliders that layers change, and of look controls after adding the
+            eye bones.
 
     Returns:
         float32[R] raw controls, and rotations: "neck" and "head" -> Quaternion in the armature's

@@ -69,6 +69,9 @@ def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
 def count(rig: ArmatureObject, before: object, after: object, labels: Sequence[str]) -> None:
     """Count a frame after which a face had to be evaluated again.
 
+    Without a known dependency on a face, the frame counts only if a raw control or the rotation of
+    the head differs.
+
     Args:
         rig: deforming armature.
         before, after: states from last_written.inputs before and after this evaluation: a tuple

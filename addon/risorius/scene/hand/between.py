@@ -132,7 +132,7 @@ def move(
         paths: data paths of the controls to move.
 
     Returns:
-        Names of the moved sliders.
+        Names of the sliders with a path in `paths`, even if their values do not change.
     """
     controls = parts.controls_there(rig)
     values = {
