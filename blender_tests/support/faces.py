@@ -77,7 +77,7 @@ def small_face(
     translation_unit="cm",
     head_grid=(12, 14),
 ):
-    """A Dna with every kind of data that the add-on imports; it is the same in every call."""
+    """A Dna with all data that the add-on imports except RBF poses; equal arguments, equal Dna."""
     random = np.random.default_rng(7)
     dna = risorius.Dna()
     dna.name, dna.lod_count, dna.max_lod = name, 2, 0
@@ -172,8 +172,7 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
     Args:
         dna: a small_face.
         joints, controls, channels, maps: the new order, as old indices and names of new items.
-            Items
-            that are not in it are removed with their data. None: no change.
+            Old items that the order lacks are removed with their data. None: no change.
 
     Returns:
         The same Dna.

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Computes skinning and morphing in float64 from the description of the format alone.
 
-It uses no code of the add-on: it takes a Pose and returns vertices in Blender's axes and metres.
+This module uses no code of the add-on: it takes a Pose and returns vertices in Blender's axes and
+units.
 """
 
 import numpy as np

@@ -116,7 +116,7 @@ def pose_bones(rig):
 
 
 def snapshot(rig):
-    """Vertices of all meshes of a character, concatenated, float64[V, 3]."""
+    """Evaluated vertices of all meshes of a face in world space, concatenated, float64[V, 3]."""
     return np.concatenate([evaluated(m) for _, m in sorted(meshes(rig).items())])
 
 

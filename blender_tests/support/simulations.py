@@ -28,7 +28,7 @@ def apart(film, wanted):
 
 
 def moving(dna_file, mode, far=0.2):
-    """(armature, meshes[0]) of a face with keys on jaw, head bone and location of the controls."""
+    """(armature, DNA mesh 0) of a face with keys of sliders, head bone and its controls' place."""
     rig = scene.load(dna_file, mode)
     controls = animate(rig)
     for frame, x in ((1, 0.0), (6, far), (10, far / 2)):

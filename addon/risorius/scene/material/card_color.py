@@ -27,7 +27,8 @@ def color_of(look: Look, mesh: plans.MeshPlan) -> Color | None:
         mesh: cards of hair.
 
     Returns:
-        Linear colour and opacity, 0 to 1; None without UV map or without a picture with alpha.
+        Linear colour and opacity, 0 to 1; None without UV map, without a readable picture with
+        alpha, or if the cards show only transparent parts of the picture.
     """
     picture = look.image("color")
     if picture is None or picture.channels != 4 or mesh.uvs is None or not len(mesh.face_starts):

@@ -109,7 +109,7 @@ class Images:
         self._room, self._files = 0, 0  # bytes of all loaded images, in memory and as files
 
     def load(self, path: Path | None, data: bool = False) -> bpy.types.Image | None:
-        """The image of a file, or None if it is missing or unreadable.
+        """The image of a file; None if it is missing, unreadable or needs too much memory.
 
         Args:
             path: path of the file; None gives None.

@@ -49,7 +49,7 @@ class Bucket(NamedTuple):
     """
 
     kind: str  # "flush", "color", "normal" or "bump"
-    number: int = 0  # of the texture set, for "color" and "normal"
+    number: int = 0  # number of the texture set, for "color" and "normal"
     folds: str = ""  # kind of folds for "bump", see animated_maps.FOLDS
 
 
@@ -61,7 +61,7 @@ class Mask(NamedTuple):
 
     kind: str  # "own", "atlas" or "area"
     place: str = ""  # region for "atlas", area for "area"
-    map_index: int = -1  # for "own"
+    map_index: int = -1  # index of the animated map, for "own"
 
 
 class Skin:

@@ -197,11 +197,11 @@ def write(
         paths: paths of matching parents.
         shares: share of each parent.
         regions: region -> index of a parent in `paths` -> share, for regions with separate shares.
-        progress: called with the finished share, 0 to 1.
+        progress: function that is called with the progress, 0 to 1.
 
     Returns:
-        Textures taken unmixed from the parent with the largest share -> reason, a key of
-        mixing.textures.WHY.
+        File name of a texture taken unmixed from the parent with the largest share -> reason, a
+        key of mixing.textures.WHY.
 
     Raises:
         MixError: the new file is one of the parents.

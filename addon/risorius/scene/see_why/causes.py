@@ -71,13 +71,13 @@ class Found:
 
 @dataclass(frozen=True)
 class Part:
-    """A corrective that has a given control as a factor.
+    """A corrective or RBF pose that has a given control as a factor or input.
 
     Attributes:
-        control: index of the corrective.
+        control: index of the corrective or of the pose's output.
         name: its name in lists.
         value: its current value.
-        others: (name, value) of its other factors.
+        others: (name, value) of its other factors or inputs.
     """
 
     control: int
@@ -144,7 +144,7 @@ def last(rig: ArmatureObject) -> Found | None:
 
 
 def firing(now: present.Present) -> list[int]:
-    """Indices of firing (not 0) correctives, network outputs and poses, largest values first.
+    """Indices of firing (not 0) correctives, network and pose outputs, largest magnitude first.
 
     Args:
         now: the face in its current pose.
@@ -222,7 +222,10 @@ def strongest(rig: ArmatureObject, count: int = 8) -> list[Cause]:
 
 
 def is_known(rig: ArmatureObject) -> bool:
-    """Whether `strongest` is computed for the current pose. Args: rig  deforming armature."""
+    """Whether `strongest` is computed for the current pose; True if the face has no pose.
+
+    Args: rig  deforming armature.
+    """
     now, kept = present.of(rig), _fired.get(rig.session_uid)
     return now is None or (
         kept is not None and kept[0] == (id(now.live), now.raw.tobytes(), now.lod)
@@ -253,11 +256,11 @@ def _strongest(rig: ArmatureObject, now: present.Present) -> list[Cause]:
 
 
 def parts_of(rig: ArmatureObject, control: int) -> list[Part]:
-    """The correctives that have a control as a factor, firing ones first.
+    """The correctives and RBF poses that have a control as a factor or input, largest values first.
 
     Args:
         rig: deforming armature.
-        control: index of the raw control.
+        control: index of the control, in raw | corrective | network | pose.
     """
     now = present.of(rig)
     if now is None:
@@ -310,7 +313,7 @@ def control_of(rig: ArmatureObject, label: str) -> int:
 
 
 def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
-    """The vertex of a mesh nearest to a position in the current pose; -1 if there is none.
+    """The vertex of a mesh nearest to a position in the current pose; -1 if there is no pose.
 
     Args:
         rig: deforming armature.

@@ -52,7 +52,7 @@ class Heat:
         kind: CONTROL: motion of a control from rest to 1; POSE: distance of the current pose from
             neutral; CORRECTIVE, LAYER: motion that one corrective or layer adds to the pose.
         what: label of the control, index of the corrective, or index of the layer.
-        most: motion in millimetres that gets the hottest colour.
+        most: largest motion in millimetres; it gets the hottest colour if it is 0.01 or more.
     """
 
     kind: str
@@ -302,7 +302,7 @@ def title(rig: ArmatureObject, heat: Heat, called: Callable[[str], str] = str) -
     Args:
         rig: deforming armature of the face.
         heat: its heat map.
-        called: returns the label of a control or corrective.
+        called: function that returns the label of a control or corrective from its name.
     """
     if heat.kind == "POSE":
         return told("Moved from Neutral")

@@ -27,7 +27,7 @@ from . import assigned
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-VERSION = 2  # of the drawing style; pictures of another version are drawn again
+VERSION = 2  # version of the drawing style; pictures of another version are drawn again
 _SKIN = np.array([0.62, 0.60, 0.58])
 _CLAY = 0.82  # factor of the sample man's colours, which are plain clay
 _MOVED = np.array([0.95, 0.45, 0.10])
@@ -90,7 +90,10 @@ def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
 
 
 def model_of(item: MeshObject) -> Model:
-    """Read the data for the pictures of a head. Args: item mesh with shape keys."""
+    """Read the data for the pictures of a head, and store the paths for `paths_of`.
+
+    Args: item  mesh with shape keys.
+    """
     keys, mesh = parts.keys_there(item), item.data
     turn = np.array(item.matrix_world.to_3x3(), np.float64)
 
@@ -250,12 +253,12 @@ def make(
     progress: Callable[[float], None] = lambda _share: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Draw missing pictures and write their files, without using Blender data.
+    """Draw the pictures of a job and write their files, without using Blender data.
 
     Args:
         job: pictures to draw.
-        progress: called with the finished share, 0 to 1.
-        cancelled: returns whether to stop.
+        progress: function that is called with the progress, 0 to 1.
+        cancelled: function that returns whether to stop.
 
     Returns:
         The number of drawn pictures.

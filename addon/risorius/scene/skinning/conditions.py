@@ -250,7 +250,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
         depsgraph: dependency graph with the updates of the edit.
 
     Returns:
-        Session uids of meshes edited by anyone but this add-on.
+        Session uids of meshes edited by anyone but this add-on; empty after undo and redo.
     """
     edits = _Edits(_told.get(_key_of(depsgraph), 0))
     for update in depsgraph.updates:
@@ -477,7 +477,7 @@ def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModi
 
     Returns:
         In Direct mode the modifier that the add-on disabled, even if the user has changed its
-        object; otherwise the first armature modifier of this rig.
+        object; otherwise the first armature modifier of this rig; None if there is none.
     """
     marked = saved.whole(item, parts.FINISHED, 0)
     own = None

@@ -17,7 +17,7 @@ from ..base import parts, saved, session
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import meshes, runtime
 
-_SAMPLES = 16  # vertices, about, whose weights are compared to see whether undo changed a mesh
+_SAMPLES = 16  # approximate number of vertices compared to see whether undo changed a mesh
 
 
 @dataclass

@@ -57,7 +57,7 @@ class Spoken(Protocol):
     """The members of RISORIUS_PG_spoken."""
 
     sounds: Rows
-    active: int
+    active: int  # index of the chosen sound
     start: float
     """Frame of the clip's first sample."""
     end: float
@@ -66,10 +66,10 @@ class Spoken(Protocol):
     """Frames per second of the scene when the action was made."""
     rate: float
     """Samples per second of the clip."""
-    samples: int
-    whole: bool
-    tolerance: float
-    intensity: float
+    samples: int  # number of samples of the clip
+    whole: bool  # whether keys are on whole frames only
+    tolerance: float  # largest difference of a slider from the clip; 0: a key for each sample
+    intensity: float  # strength of mouth and brows with which the clip was made
     openness: str
     """Value of this name in the metadata of a correctable clip."""
     built: str

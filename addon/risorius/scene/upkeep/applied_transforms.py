@@ -25,7 +25,7 @@ from ..base.blender_types import ArmatureObject, MeshObject
 
 _NEAR = 1e-5  # relative rounding error of products in float32
 _FLAT = 1e-12  # smallest determinant of a matrix that can be inverted
-_SAMPLES = 4  # vertices of a mesh, about, that are compared to see whether its data changed
+_SAMPLES = 4  # approximate number of vertices compared to see whether a mesh changed
 _BY_HAND = ("EDIT", "SCULPT")  # modes in which the user moves points
 
 
