@@ -289,7 +289,7 @@ def other_face(**options):
 
 
 TURNING = tuple(f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw")
-UP, SIDE = 1, 2  # poses of neck_face
+UP, SIDE = 1, 2  # indices in NECK_POSES of two poses of neck_face
 # Quaternions x y z w of neck_01 and then head in each pose, relative to rest, in the joints' axes.
 NECK_POSES = (
     (0, 0, 0, 1, 0, 0, 0, 1),

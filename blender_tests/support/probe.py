@@ -15,7 +15,7 @@ class Probe(bpy.types.RenderEngine):
     bl_use_preview = False
 
     seen = {}  # frame -> {mesh index: float64[V, 3] in world space}
-    between = ()  # offsets in frames at which it also records
+    between = ()  # offsets from the frame, in frames, at which the engine also records
 
     def render(self, depsgraph):
         frame = depsgraph.scene_eval.frame_current

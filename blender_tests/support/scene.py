@@ -85,7 +85,7 @@ def raw_of(rig, path):
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
     """Largest coordinate difference between Blender's and the oracle's vertices of a face.
 
-    It is relative to the mesh's size. The armature may have any transform.
+    The difference is divided by the size of the mesh. The armature may have any transform.
     """
     place = np.array(rig.matrix_world)
     dna = risorius.load(str(path))

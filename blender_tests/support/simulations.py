@@ -22,7 +22,7 @@ def film(item, frames=FRAMES):
 
 
 def apart(film, wanted):
-    """The largest coordinate difference between two films, as a share of the mesh's size."""
+    """The largest coordinate difference between two films, divided by the mesh's size."""
     size = np.ptp(wanted[min(wanted)], axis=0).max()
     return max(float(np.abs(film[f] - wanted[f]).max()) for f in wanted) / size
 

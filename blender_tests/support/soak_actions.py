@@ -530,4 +530,5 @@ WEIGHTS = {
     "render": 6, "unkey": 15,
     "disable_and_enable": 10, "lod_by_distance": 12, "place": 15, "attach": 12, "test_channel": 15,
 }  # fmt: skip
+# Actions after which soak.py pushes no undo step.
 NOT_PUSHED = {"undo", "redo", "save", "save_and_load", "revert"}

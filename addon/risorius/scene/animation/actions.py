@@ -129,7 +129,7 @@ def _reduced(
 ) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
     """Yields each track, its values [frames, width], and a mask of the keys that remain after the
     reduction, bool[frames, width]."""
-    most = max(_AT_ONCE // len(frames), 16)  # columns
+    most = max(_AT_ONCE // len(frames), 16)  # columns to collect before a reduction
     waiting, width = [], 0
     for number, track in enumerate(tracks):
         waiting.append(track)
@@ -152,7 +152,7 @@ def _reduced(
 def _new_curve(bag: bpy.types.ActionChannelbag, track: Track, index: int) -> bpy.types.FCurve:
     rna: Any = bag.fcurves.bl_rna
     words = rna.functions["new"].parameters.keys()
-    for word in ("action_group", "group_name"):  # argument in Blender up to 4.3; since 5.0
+    for word in ("action_group", "group_name"):  # name of the argument up to Blender 4.3; since 5.0
         if word in words:
             return bag.fcurves.new(track.path, index=index, **{word: track.group})
     curve = bag.fcurves.new(track.path, index=index)

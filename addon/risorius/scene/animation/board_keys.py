@@ -123,7 +123,7 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
         board_bones.show(controls, False)
         return done
     before, done = done, switch(rig, by_board=True, with_keys=True)
-    if done.kept is not None and before.kept is not None:  # the action with slider keys
+    if done.kept is not None and before.kept is not None:  # done.kept has slider keys
         bpy.data.actions.remove(done.kept)
         done.kept = before.kept
     return done

@@ -433,7 +433,7 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
     """Set interpolation and handle types of the last key in time, if a curve has at most two."""
     if len(curve.keyframe_points) > 2:
-        return  # Blender copied them from the previous key
+        return  # Blender copied both settings from the previous key
     for key in (
         curve.keyframe_points[-1:] if len(curve.keyframe_points) > 1 else curve.keyframe_points
     ):

@@ -37,7 +37,8 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     playing = [layer for layer in settings if not layer.mute]
     if any(layer.solo for layer in playing):
         playing = [layer for layer in playing if layer.solo]
-    curves = [_weight_curve(controls, layer) for layer in playing]  # before _push_down
+    # The active action is read here, because `_push_down` unassigns it.
+    curves = [_weight_curve(controls, layer) for layer in playing]
     notes, count = [], 0
     for place, layer in enumerate(playing):
         trouble = obstacle(controls, layer, curves[place])

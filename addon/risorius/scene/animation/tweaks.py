@@ -32,7 +32,7 @@ _REST = (0.0, 0.0, 0.0)  # rest location of the gaze target
 _FARTHEST = (179.0, 89.0, 179.0)  # degrees of yaw, pitch and roll that a layer can hold
 
 
-Curves = Mapping[tuple[str, int], bpy.types.FCurve]  # by data path and index
+Curves = Mapping[tuple[str, int], bpy.types.FCurve]  # by data path and array index
 Rows = dict[str, tuple[float, ...]]
 
 

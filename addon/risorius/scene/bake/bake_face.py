@@ -131,7 +131,7 @@ def bake(
 
     Raises:
         BakeError: a character cannot be baked; none was baked.
-        ValueError: the range has no frame.
+        ValueError: the range ends before it starts, or the step is not above 0.
     """
     for rig in rigs:
         trouble = refusal(rig, options.kind) or controls_ahead.examine(

@@ -18,9 +18,8 @@ LOD_RENDER = "risorius_lod_render"  # on the deforming armature: level in render
 LOD_BY_DISTANCE = (
     "risorius_lod_by_distance"  # on the rig: whether camera distance chooses the level
 )
-LOD_DISTANCES = (
-    "risorius_lod_distances"  # on the rig: entry n: camera distance, Blender units, of level n + 1
-)
+# On the rig: entry n is the camera distance in Blender units at which level n + 1 begins.
+LOD_DISTANCES = "risorius_lod_distances"
 FOLLOW = "risorius_follow"  # on the rig: whether it copies the transform of the control armature
 UNIT = "risorius_unit"  # on the deforming armature: metres per Blender unit at import
 SOURCE = "risorius_source"  # on the deforming armature: path of the imported file
@@ -32,16 +31,18 @@ BODY_NECK = "risorius_body_neck"  # on the control armature: neck bones of the b
 BODY_HEAD = "risorius_body_head"  # on the control armature: head bone of the body
 MESH_PREFIX = "risorius_mesh_"  # prefix of numbered properties of the rig: pointers to its meshes
 MESH = "dna_mesh"  # on a mesh object: index of its mesh in the DNA file
-RESIDUAL = "risorius_residual"  # colour attribute: distance of solved curves from the source mesh
+RESIDUAL = "risorius_residual"  # colour attribute: distance of the solved face from the source mesh
 LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: index of its joint in the DNA file
-HIDDEN_PREFIX = "risorius_"  # before a flag such as hide_render, on a mesh: its last written value
+# On a mesh object, before the name of a flag such as hide_render: the last written value of the
+# flag.
+HIDDEN_PREFIX = "risorius_"
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
 # On a mesh object in Direct mode (see direct.py): persistent uid of its Armature modifier, which
 # is switched off.
 FINISHED = "risorius_finished"
 SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" forbids Direct mode
-JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: an old add-on saved it with shown joints
+JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: saved with shown joints by an old add-on
 VALUES = "risorius_values"  # on the deforming armature: the mesh that drivers read maps from
 NAMES = "risorius_names"  # on a Mesh: names that the user assigned to shape keys, see assigned.py
 LANDMARK = "risorius_landmark"  # on an empty: name of its head landmark, see points.py
@@ -57,7 +58,7 @@ TEST = (
 LOOK = "risorius_look"  # on the deforming armature: solo and mute settings, see look_masks.py
 HEAT = "risorius_heat"  # on the rig: kind of its heat map; on meshes: name of the colour attribute
 HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with a heat map: colour attributes active before
-BAKED = "risorius_baked"  # on rig or controls: notes of a bake; a baked rig is not live
+BAKED = "risorius_baked"  # on rig or controls: settings of a bake; a rig with it is not live
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature with the control properties

@@ -66,8 +66,8 @@ class _Entry:
         self.clear, self.is_new = clear, is_new
 
 
-_entries: dict[str, _Entry] = {}  # by name, so that a reloaded module replaces its entry
-_by_end: dict[str, list[_Entry]] = {}  # prepared, because `end` runs at each frame
+_entries: dict[str, _Entry] = {}  # by name of the value: a reloaded module replaces its entry
+_by_end: dict[str, list[_Entry]] = {}  # by event; prepared, because `end` runs at each frame
 
 
 def table(  # the annotation of the assigned variable gives the types

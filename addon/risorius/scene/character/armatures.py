@@ -23,7 +23,7 @@ SHELF = "Joints"  # the hidden bone collection of the deforming bones
 LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
 
 Point = tuple[float, float, float]
-BonePlace = tuple[Point, Point, float, str]  # position, axis, length, name of the parent
+BonePlace = tuple[Point, Point, float, str]  # position, axis, length, parent's name
 
 
 @contextmanager

@@ -210,7 +210,7 @@ def _source(path: Path) -> str:
     """
     try:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
-    except ValueError:  # another drive
+    except ValueError:  # the files are on different drives
         return str(path)
 
 

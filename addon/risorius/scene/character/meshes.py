@@ -40,7 +40,8 @@ _fresh: set[int] = session.keep("meshes.fresh", set, ("undo", "load"))
 def fresh_weights(item: MeshObject) -> bool:
     """Whether a mesh was not edited since its import.
 
-    Its skin weights then equal the weights in the DNA file.
+    Its skin weights then equal the weights in the DNA file. False after undo and after a file was
+    opened, because edits made before are unknown.
     """
     return item.session_uid in _fresh
 

@@ -155,9 +155,9 @@ class Turning:
         bone: the control bone that rotates the joint, "neck" or "head"; "": none.
         share: fraction of the control bone's rotation that the joint gets, 0 to 1.
         armature_axes: matrix that converts the vector part of a quaternion from the armature's
-            axes to the file's.
-        bone_axes: matrix that converts the vector part from the axes of the joint's bone to the
-            file's.
+            axes to the joint's axes in the file.
+        bone_axes: matrix that converts the vector part of a quaternion from the axes of the joint's
+            bone to the joint's axes in the file.
     """
 
     joint: int

@@ -18,7 +18,7 @@ from ..character import board, runtime
 from . import kept_points, sliders
 from .skin import Point, Skin
 
-COUNT = 18  # handles of a face
+COUNT = 18  # number of handles of a face
 _SHARE = 0.1  # least motion of a handle by a slider, divided by the motion of its strongest slider
 _placed: WeakKeyDictionary[native.Surface, list[Point]] = session.keep(
     "handles.placed", WeakKeyDictionary, ("unregister",)

@@ -20,8 +20,8 @@ from ..skinning import conditions, direct
 
 Float = NDArray[np.float64]
 
-_STRAIGHT = np.eye(4)  # no motion
-_LAST = (0.0, 0.0, 0.0, 1.0)  # row of an affine matrix
+_STRAIGHT = np.eye(4)  # matrix without motion
+_LAST = (0.0, 0.0, 0.0, 1.0)  # last row of an affine matrix
 
 
 class HeadTurns:

@@ -81,7 +81,8 @@ def _first(
 ) -> tuple[bpy.types.Object, Vector, int, Matrix] | None:
     """The first object that a ray meets, except objects drawn as wire or bounds.
 
-    Returns: (original object, location in world space, index of the polygon, world matrix).
+    Returns: (original object, location in world space, index of the polygon, world matrix); None if
+    the ray meets nothing else or more than _THROUGH such objects.
     """
     depsgraph = context.evaluated_depsgraph_get()
     for _ in range(_THROUGH):
@@ -105,7 +106,10 @@ def _nearest(
     place: NDArray[np.float64],
     index: int,
 ) -> Hit | None:
-    """The vertex of a face's mesh nearest to the hit of a ray; None if it is too far away."""
+    """The vertex of a face's mesh nearest to the hit of a ray.
+
+    None if the vertex is too far away, or if the mesh belongs to another level of detail.
+    """
     mesh, skin = int(item[parts.MESH]), Skin.of(context, rig, live)
     if mesh not in skin.surface.mesh_indices:
         return None

@@ -76,7 +76,8 @@ class Skin:
     def seen(self, mesh: int) -> Float | None:
         """float64[V, 3]: evaluated vertices of a mesh in world space.
 
-        None if the mesh is hidden or in edit mode, or a modifier changes its vertex count.
+        None if the mesh is hidden or in edit mode, or if its vertex count differs from the DNA file
+        before or after the modifiers.
 
         Args:
             mesh: index of the mesh in the DNA file.

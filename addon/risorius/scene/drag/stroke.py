@@ -106,7 +106,8 @@ class Stroke:
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)
     _was: NDArray[np.float32] | None = None  # [V, 3], dragged mesh at the press in file space
     _eases: dict[tuple[Point, ...], Float] = field(default_factory=dict)
-    _apart: Float = field(default_factory=lambda: np.zeros(3))  # seen minus predicted, world space
+    # float64[3]: seen minus predicted position of the point, in world space.
+    _apart: Float = field(default_factory=lambda: np.zeros(3))
 
     @property
     def start(self) -> Float:
@@ -313,7 +314,7 @@ class Stroke:
         points = [self.point, *others]
         mirrored = [False] * len(points)
         for point in (self.point, *others) if symmetric else ():
-            other = self.skin.mirrored(point)  # itself for a point on the middle line
+            other = self.skin.mirrored(point)  # the point itself if it is on the middle line
             if other is not None and (other == point or other not in points):
                 points.append(other)
                 mirrored.append(True)

@@ -162,7 +162,7 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     known = _objects.now
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)
-    come = bool(known)  # empty after load and undo, when no object counts as new
+    come = bool(known)  # `known` is empty after load and undo: nothing is new
     if new or len(bpy.data.objects) != len(known):
         _objects.now = frozenset(item.session_uid for item in bpy.data.objects)
         runtime.forget_unused(parts.rigs())
@@ -219,7 +219,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
                 armatures.add(item)
             camera_moved |= camera is not None and item == camera.original
     if bones_edited:
-        last_written.forget()  # includes the cached rest pose of the bones
+        last_written.forget()  # this also forgets the cached rest pose of the bones
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)

@@ -71,7 +71,7 @@ def sampled(
     Raises:
         BakeError: a character is baked, so that its controls do not give its animation, or the
             level was not built.
-        ValueError: the range has no frame.
+        ValueError: the range ends before it starts, or the step is not above 0.
     """
     for rig in rigs:
         if bake_face.baked(rig) == bake_face.RESULT:
@@ -108,7 +108,8 @@ def copies(
     with evaluate.paused():
         try:
             stage = _stage(user, characters[0][2].frames)
-            loans.take("scenes", stage, _name(characters[0][0]))  # some formats name takes by it
+            # Some formats name the animation (the take) after the scene.
+            loans.take("scenes", stage, _name(characters[0][0]))
             for rig, level, samples in characters:
                 _copy(stage, rig, level, samples, options, loans)
             layer = stage.view_layers[0]

@@ -26,7 +26,7 @@ RISORIUS, LIBRARY, FILE = "RISORIUS", "LIBRARY", "FILE"
 MARK = "risorius_expression"  # on an action and its asset: the text of the expression
 _FAVOURITES = "favourites.txt"
 _MOST = 2000  # largest number of files that are read from a library
-_AT_ONCE = 100  # expressions that are written together, all or none
+_AT_ONCE = 100  # number of expressions that are written together, all or none
 
 
 class LibraryError(FaceError):

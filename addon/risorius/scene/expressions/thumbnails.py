@@ -205,7 +205,7 @@ def _pixels(
             held = np.empty(width * height * 4, np.float32)
             floats: Any = copy.pixels
             floats.foreach_get(held)
-        except (RuntimeError, TypeError):  # its file is missing
+        except (RuntimeError, TypeError):  # the file of the image is missing
             return None
         finally:
             bpy.data.images.remove(copy)

@@ -156,7 +156,7 @@ def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native
 
 
 def _mirrored(context: Context, item: MeshObject) -> bpy.types.Mesh | None:
-    """A new mesh with the Mirror modifiers of an object applied; None if it has none."""
+    """A new mesh with the shown Mirror modifiers of an object applied; None if there is none."""
     kinds = [modifier.type for modifier in item.modifiers if modifier.show_viewport]
     if "MIRROR" not in kinds:
         return None

@@ -32,8 +32,8 @@ _REDRAW = 0.25  # seconds between redraws of the status
 class _State:
     """State of the timer that writes captured faces."""
 
-    error: str = ""  # why the last capture ended by itself
-    since_redraw: float = 0.0  # seconds
+    error: str = ""  # why the last capture ended by itself; "" if it did not
+    since_redraw: float = 0.0  # seconds since the last redraw of the sidebars
     undone: bool = False  # whether undo or redo ran since the last tick
 
 

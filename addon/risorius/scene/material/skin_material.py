@@ -19,7 +19,8 @@ from .nodes import Graph, Value
 
 MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
-FOLDS = "risorius_folds"  # mesh attribute: x, height, distance from the mouth
+# Mesh attribute: x, height and distance from the mouth, see skin_folds.fold_coordinates.
+FOLDS = "risorius_folds"
 BORDER = "risorius_border"  # mesh attribute: 1 near an open border, 0 far away
 _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)

@@ -19,8 +19,8 @@ from ..base import parts, session
 from ..base.blender_types import ArmatureObject
 from . import displacement, present
 
-Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joint deltas, channel weights
-_LEAST = 1e-3  # millimetres; less is float32 rounding of a head 1.7 m above the origin
+Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # deltas [J, 9], weights [B]
+_LEAST = 1e-3  # mm; smaller motions are float32 rounding of a head at 1.7 m height
 _MOST_FIRING = 24  # correctives whose motion is computed: those with the largest values
 # Session uid of a deforming armature -> last result of `of_vertex`.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
@@ -139,7 +139,7 @@ def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
 
 
 def last(rig: ArmatureObject) -> Found | None:
-    """The last result of `of_vertex`. Args: rig deforming armature."""
+    """The last result of `of_vertex`; None if there is none. Args: rig  deforming armature."""
     return _found.get(rig.session_uid)
 
 

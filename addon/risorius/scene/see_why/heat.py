@@ -61,7 +61,7 @@ class Heat:
 
 
 def of(rig: ArmatureObject) -> Heat | None:
-    """The heat map that a character shows. Args: rig  its deforming armature."""
+    """The heat map that a character shows, or None. Args: rig  the deforming armature."""
     kind, *rest = saved.text(rig, parts.HEAT).split("\n", 2)
     try:
         most, what = float(rest[0]), rest[1]
@@ -282,7 +282,8 @@ def watch() -> None:
 
 def _look() -> float | None:
     """Called by the timer: update the colours of changed poses. The pause is at least three times
-    the duration of the update, so that updates take at most a quarter of the time."""
+    the duration of the update, so that updates take at most a quarter of the time. Returns: seconds
+    until the next call; None ends the timer."""
     begin = perf_counter()
     shown = [rig for rig in parts.rigs() if parts.HEAT in rig]
     if not shown:

@@ -65,7 +65,7 @@ _said: dict[int, Sentence] = session.table("applied_transforms.said", ("undo", "
 
 
 def last_said(rig: ArmatureObject) -> Sentence | None:
-    """The sentence about the last undone step of a face. Args: rig  deforming armature."""
+    """The sentence about the last undone step, or None. Args: rig  the face's armature."""
     return _said.get(rig.session_uid)
 
 
