@@ -25,7 +25,13 @@ UNOWNED = 5
 
 
 def _grid(columns, rows, radius, center):
-    """Positions, normals, UVs and quads of a patch of a sphere that faces the DNA's front (+z)."""
+    """Positions, normals, UVs and quads of a patch of a sphere that faces the DNA's front (+z).
+
+    Args:
+        columns, rows: numbers of vertices.
+        radius: radius of the sphere in the DNA's unit.
+        center: float[3], centre of the sphere.
+    """
     u, v = np.meshgrid(np.linspace(-1.2, 1.2, columns), np.linspace(-1.2, 1.2, rows))
     u, v = u.ravel(), v.ravel()
     unit = np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=1)
@@ -77,7 +83,14 @@ def small_face(
     translation_unit="cm",
     head_grid=(12, 14),
 ):
-    """A Dna with all data that the add-on imports except RBF poses; equal arguments, equal Dna."""
+    """A Dna with all data that the add-on imports except RBF poses; equal arguments, equal Dna.
+
+    Args:
+        name: name of the face.
+        axes, rotation_sequence, rotation_signs, rotation_unit, translation_unit: conventions of the
+            file.
+        head_grid: columns and rows of vertices of the head mesh.
+    """
     random = np.random.default_rng(7)
     dna = risorius.Dna()
     dna.name, dna.lod_count, dna.max_lod = name, 2, 0

@@ -89,6 +89,12 @@ def halves(left, right, size=16):
 def stage(items, size=32, engine="CYCLES", samples=4):
     """Light the scene by two suns, and look at some objects from the front (-y).
 
+    Args:
+        items: the objects to show.
+        size: width and height of the render in pixels.
+        engine: render engine.
+        samples: samples per pixel.
+
     Returns:
         The scene, and the x and z coordinates that each pixel shows: float[size, size] each.
     """

@@ -14,7 +14,12 @@ _AXES = {
 
 
 def _rotation(dna, angles):
-    """Rotation matrix for column vectors; the first axis of the rotation sequence acts first."""
+    """Rotation matrix for column vectors; the first axis of the rotation sequence acts first.
+
+    Args:
+        dna: gives unit, order and signs of the rotations.
+        angles: float64[3], in the DNA's unit.
+    """
     if dna.rotation_unit == "degrees":
         angles = np.radians(angles)
     matrix = np.eye(3)

@@ -46,7 +46,12 @@ def _vertices(item):
 
 @contextmanager
 def rendering(setup, between=()):
-    """Context manager: renders of a scene use the probe. Yields the dict that they fill."""
+    """Context manager: renders of a scene use the probe. Yields the dict that they fill.
+
+    Args:
+        setup: the scene.
+        between: offsets in frames at which vertices are recorded too.
+    """
     bpy.utils.register_class(Probe)
     before = setup.render.engine
     Probe.seen = {}

@@ -86,6 +86,13 @@ def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
     """Largest coordinate difference between Blender's and the oracle's vertices of a face.
 
     The difference is divided by the size of the mesh. The armature may have any transform.
+
+    Args:
+        rig: deforming armature.
+        path: the face's DNA file.
+        raw: float32[R], raw controls for the oracle.
+        lod: level of detail to compare.
+        unit_scale: metres per Blender unit.
     """
     place = np.array(rig.matrix_world)
     dna = risorius.load(str(path))

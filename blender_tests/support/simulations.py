@@ -28,7 +28,13 @@ def apart(film, wanted):
 
 
 def moving(dna_file, mode, far=0.2):
-    """(armature, DNA mesh 0) of a face with keys of sliders, head bone and its controls' place."""
+    """(armature, DNA mesh 0) of a face with keys of sliders, head bone and its controls' place.
+
+    Args:
+        dna_file: path of the DNA file.
+        mode: shape mode of the import.
+        far: distance in x by which the controls move, in Blender units.
+    """
     rig = scene.load(dna_file, mode)
     controls = animate(rig)
     for frame, x in ((1, 0.0), (6, far), (10, far / 2)):

@@ -128,7 +128,14 @@ def _reduced(
     frames: NDArray[np.float64], tracks: Sequence[Track], error: float, counts: Counts
 ) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
     """Yields each track, its values [frames, width], and a mask of the keys that remain after the
-    reduction, bool[frames, width]."""
+    reduction, bool[frames, width].
+
+    Args:
+        frames: float64[N], frames of the scene.
+        tracks: values of the properties at these frames.
+        error: largest error of the key reduction; 0: keep all keys.
+        counts: totals, which this call increases.
+    """
     most = max(_AT_ONCE // len(frames), 16)  # columns to collect before a reduction
     waiting, width = [], 0
     for number, track in enumerate(tracks):

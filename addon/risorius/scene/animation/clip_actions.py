@@ -229,7 +229,14 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
 def _set_from(
     points: bpy.types.FCurveKeyframePoints, name: str, first: int, new: NDArray[Any]
 ) -> None:
-    """Set the keyframe property `name` of all keyframes from index `first` to the end."""
+    """Set the keyframe property `name` of all keyframes from index `first` to the end.
+
+    Args:
+        points: the keyframes of an F-curve.
+        name: name of a property of a keyframe.
+        first: index of the first changed keyframe.
+        new: values of the property, flat.
+    """
     if first:
         width = len(new) // (len(points) - first)
         whole = np.empty(len(points) * width, new.dtype)

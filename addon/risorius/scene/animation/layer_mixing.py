@@ -268,7 +268,13 @@ def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> n
 
 
 def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
-    """Fire all reactions of the character, so that frames can be evaluated in any order."""
+    """Fire all reactions of the character, so that frames can be evaluated in any order.
+
+    Args:
+        stack: the compiled layers; reactions that cannot be fired are added to its problems.
+        controls: control armature of the character.
+        rate: frames per second.
+    """
     stack.mixer.clear_fired()
     for reaction in layers.reactions_of(controls):
         try:

@@ -282,6 +282,13 @@ def _hands_of(
 
     If the current frame has no new key but controls that the user moved there without a key, the
     _Hand of these controls is the first.
+
+    Args:
+        controls: the control armature.
+        tweak: the active tweak.
+        curves: the curves of the active action, by data path and index.
+        inserted: curve's data path and index -> frames of its new keys.
+        frame: current frame of the scene.
     """
     held = _hands.get(controls.session_uid)
     by_frame: dict[float, list[bpy.types.FCurve]] = {}

@@ -269,7 +269,17 @@ def _bone_rows(
     weight: float,
     held: bool,
 ) -> dict[str, list[float]]:
-    """Data path -> key values with which the tweak's layer reproduces the current bone poses."""
+    """Data path -> key values with which the tweak's layer reproduces the current bone poses.
+
+    Args:
+        controls: the control armature.
+        asked: data path -> name of the bone, for the properties to store.
+        below: the pose without the tweak.
+        old: curves of the tweak's layer, to which the changes are added.
+        frame: frame of the scene.
+        weight: weight of the layer at this frame.
+        held: True: properties without a change get keys too if the layer has keys of them.
+    """
     rows = {}
     for path, name in asked.items():
         bone = controls.pose.bones[name]

@@ -138,6 +138,12 @@ def _place(rig: ArmatureObject, samples: sampling.Samples, target: ArmatureObjec
 
     Empty if the rig does not follow the control armature, has a parent or constraints, or does not
     move.
+
+    Args:
+        rig: the character's deforming armature.
+        samples: inputs of the face, from sampling.sample.
+        target: the armature that will play the tracks; if the rig does not move, it gets the
+            transform.
     """
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return []
@@ -175,6 +181,13 @@ def _array(
 
     The property gets the values of the first frame. Empty if the property has another length than
     `values` has columns.
+
+    Args:
+        target: the armature with the property.
+        name: name of the property.
+        values: float32[N, width], the values at N frames.
+        group: name of the group of the F-curves.
+        indices: indices of the entries to bake.
     """
     if len(target.get(name, ())) != values.shape[1] or not values.shape[1]:
         return []

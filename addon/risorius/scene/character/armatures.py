@@ -357,6 +357,11 @@ def _sides(points: NDArray[np.float64], height: float, size: float) -> tuple[flo
     """The x coordinate of a head's centre, and half the width of the head.
 
     Only vertices near the height of the eyes count, so that the shoulders are excluded.
+
+    Args:
+        points: float64[V, 3], vertices of all meshes in Blender units.
+        height: z of the eyes.
+        size: size of the face.
     """
     near = np.abs(points[:, 2] - height) < 0.1 * size
     # A face without skin near its eyes uses the width of the whole face.

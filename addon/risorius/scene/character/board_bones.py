@@ -238,7 +238,15 @@ def _build(
     layout: Board,
     middle: Vector,
 ) -> None:
-    """Create bones in board units around the board's centre; the bone `board` scales them."""
+    """Create bones in board units around the board's centre; the bone `board` scales them.
+
+    Args:
+        edit_bones: edit bones of the control armature.
+        bars: the missing names of runtime.BOARD_BONES.
+        new: handles without a bone.
+        layout: the whole board.
+        middle: centre of the board, in the space of the armature.
+    """
     for name in bars:
         bone = edit_bones.new(name)
         head = middle + Vector((0.0, 0.3, 0.0)) if name == FRAMES else middle  # behind handles

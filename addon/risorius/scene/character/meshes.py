@@ -103,7 +103,13 @@ def build_mesh(
 
 
 def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-    """Add a vertex group with weights for each joint that the mesh uses."""
+    """Add a vertex group with weights for each joint that the mesh uses.
+
+    Args:
+        item: the mesh object.
+        mesh_plan: skin weights of the mesh.
+        labels: bone names by joint index.
+    """
     used = np.unique(mesh_plan.skin_joints)
     group_of = {int(j): item.vertex_groups.new(name=labels[int(j)]).index for j in used}
     edit = bmesh.new()

@@ -387,6 +387,12 @@ def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> fl
     """The rotation of an eye by a look control at value 1, in radians.
 
     DEFAULT_EYE_ANGLE is returned if the eye rotates by less than 2 degrees or has no joint.
+
+    Args:
+        runtime: the Runtime of the character.
+        control: index of the look control.
+        side: "L" or "R".
+        horizontal: True: yaw; False: pitch.
     """
     joint = runtime.anchors.eyes.get(side)
     if joint is None:

@@ -109,6 +109,13 @@ def _nearest(
     """The vertex of a face's mesh nearest to the hit of a ray.
 
     None if the vertex is too far away, or if the mesh belongs to another level of detail.
+
+    Args:
+        context: has the visible scene.
+        rig, live: the character and its Runtime.
+        item: the mesh object.
+        place: float64[3], the hit in world space.
+        index: index of the polygon that was hit.
     """
     mesh, skin = int(item[parts.MESH]), Skin.of(context, rig, live)
     if mesh not in skin.surface.mesh_indices:

@@ -135,7 +135,11 @@ def write(
 def _write_board(
     rig: ArmatureObject, live: runtime.Runtime, sliders: Sliders, raw: NDArray[np.float32]
 ) -> list[str]:
-    """`write` for a leading face board: its handles move from their start to the nearest pose."""
+    """`write` for a leading face board: its handles move from their start to the nearest pose.
+
+    Args:
+        rig, live, sliders, raw: see `write`.
+    """
     board.put_places(parts.controls_there(rig), live, sliders.places)
     values = sliders.values(raw)
     moved = {
@@ -183,6 +187,13 @@ def _gains(
 
     Each slider is changed alone, because layers can suppress one of two opposite controls, such as
     looking left and right.
+
+    Args:
+        seen: the evaluated control armature.
+        live: Runtime of the character.
+        depsgraph: graph in which the controls were evaluated.
+        maximum: largest value of a slider.
+        start: float64[R], values of the sliders.
     """
     gain = np.ones(len(start))
     if not layers.has_any(seen.original):

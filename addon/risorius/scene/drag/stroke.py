@@ -259,6 +259,10 @@ class Stroke:
 
         The solver measures the error of a point along its three axes; the length of an axis is the
         weight of the error along this axis.
+
+        Args:
+            anchors: the points of the drag.
+            target, view: see `to`.
         """
         goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
         shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])

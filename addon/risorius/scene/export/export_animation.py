@@ -150,7 +150,16 @@ def _copy(
     options: ShipOptions,
     loans: Loans,
 ) -> None:
-    """Copy one character: armature, meshes of the exported levels, and their baked actions."""
+    """Copy one character: armature, meshes of the exported levels, and their baked actions.
+
+    Args:
+        stage: the temporary scene.
+        rig: deforming armature of the character.
+        level: level of detail.
+        samples: inputs of the face.
+        options: options of the export.
+        loans: names for the copies.
+    """
     live = runtime.there(rig)
     pose = baked_tracks.evaluate(live, samples, level)
     copy = rig.copy()
@@ -239,6 +248,14 @@ def _shapes(
     """Give a copied mesh a shape key with baked animation for each exported blend shape channel.
 
     Other shape keys that Risorius made are removed from the copy.
+
+    Args:
+        made: the copied mesh object.
+        item: the original mesh object.
+        live: Runtime of the character.
+        samples: inputs of the face.
+        weights: float32[N, C], weights of the blend shape channels at N frames.
+        options: options of the export.
     """
     key = made.data.shape_keys
     if key is None:

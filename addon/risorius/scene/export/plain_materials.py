@@ -252,7 +252,14 @@ def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
 def _bake(
     override: Override, items: Sequence[MeshObject], flats: Sequence[_Flat], size: int
 ) -> Iterator[float]:
-    """Bake all materials: first colours, then opacity and roughness together. Yields progress."""
+    """Bake all materials: first colours, then opacity and roughness together. Yields progress.
+
+    Args:
+        override: context override of the export.
+        items: the copied meshes.
+        flats: their materials.
+        size: width and height of baked images in pixels.
+    """
     _prepare(override["scene"], size)
     spare = bpy.data.images.new("Spare", 4, 4)
     jobs = [
@@ -300,7 +307,13 @@ def _shown_on(item: MeshObject, flats: Iterable[_Flat]) -> list[_Flat]:
 
 
 def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
-    """An empty image for a bake. It is smaller if it stores roughness without opacity."""
+    """An empty image for a bake. It is smaller if it stores roughness without opacity.
+
+    Args:
+        flat: the material.
+        name: "color", or "alpha" for the image with opacity and roughness.
+        size: width and height in pixels.
+    """
     if name != "color" and "alpha" not in flat.baked:
         size = 64 if flat.mean else max(size // 4, 64)
     image = bpy.data.images.new(f"{flat.name}_{name}", size, size, alpha=True)
@@ -359,7 +372,13 @@ def _bake_one(override: Override, items: Iterable[MeshObject], item: MeshObject)
 
 
 def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Image | None) -> None:
-    """Store baked images in a material: colour with opacity, and roughness as image or number."""
+    """Store baked images in a material: colour with opacity, and roughness as image or number.
+
+    Args:
+        flat: the material.
+        color: baked image of the colour, or None.
+        masks: baked image with opacity in red and roughness in green, or None.
+    """
     values = _pixels(masks) if masks is not None else np.zeros((0, 0, 4), np.float32)
     if color is not None:
         _finish_color(color, values[..., 0] if "alpha" in flat.baked else None)

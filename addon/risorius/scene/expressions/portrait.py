@@ -187,7 +187,14 @@ def _moves(live: runtime.Runtime, deltas: Floats) -> Floats:
 def _posed(
     live: runtime.Runtime, piece: Piece, moves: Floats, channels: NDArray[np.float32]
 ) -> Floats:
-    """float64[V, 3]: vertices of a mesh after blend shapes and skinning, in file space."""
+    """float64[V, 3]: vertices of a mesh after blend shapes and skinning, in file space.
+
+    Args:
+        live: Runtime of the character.
+        piece: the mesh.
+        moves: float64[J, 4, 4], see _moves.
+        channels: float32[C], weights of the blend shape channels.
+    """
     points = np.asarray(live.dna.meshes[piece.index].positions, np.float64).copy()
     for channel, vertices, deltas in piece.shapes:
         if channel < len(channels) and channels[channel]:
@@ -215,7 +222,13 @@ def _frame(sitter: Sitter) -> tuple[Floats, float]:
 
 
 def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats:
-    """float64[V, 3]: pixels to the right, pixels down, and depth towards the viewer in pixels."""
+    """float64[V, 3]: pixels to the right, pixels down, and depth towards the viewer in pixels.
+
+    Args:
+        points: float64[V, 3] in Blender's axes.
+        middle, half: the centre of the picture and half its height, in the unit of `points`.
+        high: height and width of the picture in samples.
+    """
     seen = (points - middle)[:, [0, 2, 1]] / half
     seen[:, 2] *= -1.0  # the face looks along -y
     seen[:, :2] *= (_FAR / (_FAR - seen[:, 2]).clip(1.0))[:, None]

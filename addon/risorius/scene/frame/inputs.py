@@ -187,7 +187,12 @@ def _add_look(
     turns: Turns,
     own: layer_mixing.Bones,
 ) -> None:
-    """Add the rotations of eye bones and gaze target to the look controls, and move the lids."""
+    """Add the rotations of eye bones and gaze target to the look controls, and move the lids.
+
+    Args:
+        seen, live, raw, maximum, own: see `complete`.
+        turns: rotations of neck and head including the body.
+    """
     bones = seen.pose.bones
     eyes = {side: bones[f"eye_{side}"] for side in live.look if f"eye_{side}" in bones}
     target = gaze.target_of(seen, live, turns, own.target)

@@ -92,6 +92,9 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
     """The first control with different values in two states, or a text about the head's rotation.
 
     "" if only other inputs differ, such as the level of detail.
+
+    Args:
+        before, after, labels: see `count`.
     """
     if not isinstance(before, tuple) or not isinstance(after, tuple):
         return ""

@@ -173,7 +173,15 @@ def _error(
     live: runtime.Runtime, deltas: NDArray[np.float32], side: str, centre: Vector, target: Target
 ) -> Float:
     """float64[2]: yaw and pitch in radians by which the wanted direction of an eye differs from its
-    current direction."""
+    current direction.
+
+    Args:
+        live: the character's Runtime.
+        deltas: float32[J, 9] of a Pose.
+        side: "L" or "R".
+        centre: centre of the eye at rest, in the armature's space.
+        target: the Target.
+    """
     joint, ahead = live.anchors.eyes.get(side), _AHEAD
     still, rest = np.array(centre[:], np.float64), np.array(target.rest[:], np.float64)
     there = still

@@ -187,6 +187,11 @@ class Skin:
         """The sum of the values of animated maps, multiplied by their common mask.
 
         If the mask is an area, a map of one side of the face affects only this side.
+
+        Args:
+            bucket: the effect of the maps.
+            mask: the common mask.
+            members: side of the face and value of each map.
         """
         graph = self.graph
         if mask.kind == "own":
@@ -274,6 +279,11 @@ class Skin:
         """Mix a colour towards the colour texture of a texture set.
 
         If the texture stores differences around 0.5, the differences are added instead.
+
+        Args:
+            color: the colour without this texture set.
+            number: number of the texture set.
+            amount: 0 to 1, how much of the texture is mixed in.
         """
         graph = self.graph
         picture = graph.image(self.look.image(f"color:{number}"), label=f"Colour {number}")

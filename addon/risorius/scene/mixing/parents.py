@@ -109,7 +109,11 @@ class _Seen:
         return out
 
     def points(self, shares: Sequence[float], regions: Regions) -> NDArray[np.float64]:
-        """float64[V, 3]: vertices of the mix, in Blender's axes and units."""
+        """float64[V, 3]: vertices of the mix, in Blender's axes and units.
+
+        Args:
+            shares, regions: see the function `show`.
+        """
         mixing = native.part("mixing")
         places = mixing.Places(self.parents, mixing.Mix(list(shares), regions), self.masks)
         rows = [

@@ -119,7 +119,11 @@ def _is_as_imported(item: MeshObject, count: int) -> bool:
 def _distances(
     rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
 ) -> dict[int, NDArray[np.float64]]:
-    """Index of a mesh -> distances of its vertices between the poses of `_pair`, Blender units."""
+    """Index of a mesh -> distances of its vertices between the poses of `_pair`, Blender units.
+
+    Args:
+        rig, now, kind, what, depsgraph: see `_pair`.
+    """
     one, other = _pair(rig, now, kind, what, depsgraph)
     meshes = displacement.meshes_at(rig, now.lod)
     return {m: displacement.distances(now.live, m, one, other) for m in meshes}
@@ -128,7 +132,14 @@ def _distances(
 def _pair(
     rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
 ) -> tuple[causes.Poses, causes.Poses]:
-    """The two poses whose difference a heat map shows."""
+    """The two poses whose difference a heat map shows.
+
+    Args:
+        rig: deforming armature.
+        now: the face in its current pose.
+        kind, what: see Heat.
+        depsgraph: graph for reading layers.
+    """
     evaluate = now.live.rig.evaluate
     if kind == "CONTROL":
         if what not in now.live.labels:

@@ -152,6 +152,10 @@ def _to_front(rest: Floats, far: Floats) -> Floats:
     towards -y.
 
     A face moves at its front, so this works for every orientation of the head.
+
+    Args:
+        rest: float64[V, 3], vertices of the neutral head, z up.
+        far: float64[V], from _shares.
     """
     middle = (rest.min(axis=0) + rest.max(axis=0)) / 2
     way = (far[:, None] * (rest - middle)).sum(axis=0)[:2]
@@ -164,7 +168,12 @@ def _to_front(rest: Floats, far: Floats) -> Floats:
 
 
 def _frame(rest: Floats, far: Floats) -> tuple[Floats, float]:
-    """The centre and half the height of a picture that shows all moving vertices."""
+    """The centre and half the height of a picture that shows all moving vertices.
+
+    Args:
+        rest: float64[V, 3], vertices of the neutral head, which faces -y.
+        far: float64[V], from _shares.
+    """
     low, high = rest.min(axis=0), rest.max(axis=0)
     moved = rest[far > _MOVES]
     least = _LEAST * float((high - low)[[0, 2]].max()) / 2

@@ -321,7 +321,15 @@ def _replace(
     name: str,
     span: tuple[float, float],
 ) -> None:
-    """Replace the keys between the last key before and the first key after a span of frames."""
+    """Replace the keys between the last key before and the first key after a span of frames.
+
+    Args:
+        curve: the F-curve of a slider.
+        mouth: computes the values of the control.
+        sounds: the sounds of the voice.
+        name: name of the control.
+        span: first and last frame of the action at which the values change.
+    """
     points = curve.keyframe_points
     at = clip_actions.key_points(curve)[0].astype(np.float64)
     before = int(np.searchsorted(at, span[0] - _BESIDE)) - 1
@@ -354,7 +362,12 @@ def _samples(
     name: str,
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
-    """Frames and values of a control in a span of frames, with the curve's values at both ends."""
+    """Frames and values of a control in a span of frames, with the curve's values at both ends.
+
+    Args:
+        curve, mouth, sounds, name: see `_replace`.
+        span: first and last frame of the action.
+    """
     first, last = int(mouth.sample(span[0])), int(np.ceil(mouth.sample(span[1])))
     first, last = max(first - 1, 0), min(last + 2, mouth.said.samples)
     frames = mouth.frames(np.arange(first, last))
@@ -375,7 +388,13 @@ def _turn(
     left: Floats | None = None,
     right: Floats | None = None,
 ) -> None:
-    """Set the handle of a key that points into the replaced span; its other handle is unchanged."""
+    """Set the handle of a key that points into the replaced span; its other handle is unchanged.
+
+    Args:
+        key: the key.
+        bent: True: Bezier interpolation; False: linear.
+        left, right: new position of the handle, frame and value; None: unchanged.
+    """
     kept = key.handle_left[:], key.handle_right[:]
     if bent:
         key.handle_left_type = key.handle_right_type = "FREE"

@@ -168,7 +168,12 @@ def _backdrop(name: str, plan: studio_plan.Studio, place: Matrix) -> bpy.types.O
 
 
 def _paper(name: str, glow: float) -> bpy.types.Material:
-    """An emissive dark material with a lighter middle that falls off smoothly."""
+    """An emissive dark material with a lighter middle that falls off smoothly.
+
+    Args:
+        name: name of the material.
+        glow: distance from the middle in Blender units at which the brightness has fallen to 1/e.
+    """
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree

@@ -118,7 +118,13 @@ def _take_back(rig: ArmatureObject, touched: AbstractSet[bpy.types.ID]) -> bool:
 
 
 def _see(item: bpy.types.Object, before: _Seen | None, touched: AbstractSet[bpy.types.ID]) -> _Seen:
-    """The current state of a part; points are read only if the update reports a change."""
+    """The current state of a part; points are read only if the update reports a change.
+
+    Args:
+        item: the part, or a child of a part.
+        before: the state at the last check; None: read all.
+        touched: the datablocks of the update.
+    """
     if before is not None and item not in touched:
         return before
     parent, data = item.parent.session_uid if item.parent is not None else 0, item.data
@@ -171,7 +177,13 @@ def _places(
     known: Mapping[bpy.types.Object, Matrix],
 ) -> dict[bpy.types.Object, Matrix]:
     """The matrix of each part of a face: world matrix, or matrix relative to a parent object that
-    does not belong to the face."""
+    does not belong to the face.
+
+    Args:
+        rig: deforming armature of the face.
+        seen: part -> its state.
+        known: part -> its matrix, which replaces the matrix of the state.
+    """
     found = {item: known.get(item, _local(one)) for item, one in seen.items()}
     carried = [i for i in seen if i.parent == rig and i.parent_type == "OBJECT" and rig in found]
     found.update({item: found[rig] @ found[item] for item in carried})
@@ -183,7 +195,13 @@ def _local(seen: _Seen) -> Matrix:
 
 
 def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object]) -> bool:
-    """Undo the changes of one part. Returns whether there were any."""
+    """Undo the changes of one part. Returns whether there were any.
+
+    Args:
+        moved: the part with its state before the step.
+        now: the state after the step.
+        members: the parts of the face.
+    """
     item, before = moved.item, moved.before
     if before.parent != now.parent:
         return False
