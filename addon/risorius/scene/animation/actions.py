@@ -387,9 +387,9 @@ def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
 
 
 def note_tracks_by_name(owner: Animated) -> bool:
-    """Convert stored states of NLA tracks from the format of old .blend files to texts of `_noted`.
+    """Convert the stored states of NLA tracks from the format of old .blend files to JSON texts.
 
-    The old format stores no track names, only the states in the order of the tracks.
+    The old format stores mute and solo in the order of the tracks; the texts have names too.
 
     Returns:
         Whether the stored states had the old format and were converted.

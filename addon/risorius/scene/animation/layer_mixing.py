@@ -70,7 +70,7 @@ class Bones:
 class Kept:
     """Cache of compiled layer sources (clips or poses) and of compiled masks.
 
-    The settings of a layer, see `_key`, identify its source and its mask.
+    The keys are the settings of a layer that determine its source or its mask.
     """
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)

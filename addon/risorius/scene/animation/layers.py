@@ -137,7 +137,7 @@ def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> R
 
     Args:
         controls: control armature.
-        kind: see layer_properties.KINDS.
+        kind: source of the layer: "ACTION", "EXPRESSION" or "IDLE".
         name: name in the list; a number is added if another layer has it.
         settings: other properties of the layer by name.
 

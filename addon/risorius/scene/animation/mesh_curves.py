@@ -149,7 +149,8 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
             rate: frames per second.
             relative: True: fit the motion of the recorded mesh away from its own neutral shape;
                 False: fit its shape at each frame.
-            sparse, smooth: see risorius.solve_clip.
+            sparse: factor of the price of a control's value; 0: no price, 1: the default.
+            smooth: factor of the price of a sudden change; 0: no price, 1: the default.
 
         Raises:
             ClipError: no mesh of the face has as many vertices as the recorded mesh.

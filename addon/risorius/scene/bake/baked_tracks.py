@@ -223,7 +223,7 @@ def key_tracks(
         key: the Key datablock.
         names: index of a blend shape channel -> name of its shape key.
         weights: float32[N, B], blend shape weights at N frames.
-        others: data path -> values of shape keys that the user animates, see Samples.
+        others: data path -> values at the N frames, of shape keys that the user animates.
 
     Returns:
         One track for each key in `names`, and for each path in `others`.

@@ -40,7 +40,7 @@ class Stage:
         roots: objects to evaluate.
 
     Attributes:
-        roots: (session uid, address) of each of these objects, see `identity`.
+        roots: (session uid, memory address) of each of these objects.
     """
 
     def __init__(self, roots: Sequence[bpy.types.Object]) -> None:

@@ -123,7 +123,7 @@ class Runtime:
 
     @cached_property
     def handles(self) -> list[board_layout.Handle]:
-        """The handles of the face board. Their positions on a complete board are not set here."""
+        """The handles of the face board. Only the handles of a primary board have positions."""
         taken = (*CONTROL_BONES, *BOARD_BONES)
         if self.board == PRIMARY:
             return primary_table.handles_of(self.table, {}, taken)

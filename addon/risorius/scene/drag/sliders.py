@@ -138,7 +138,10 @@ def _write_board(
     """`write` for a leading face board: its handles move from their start to the nearest pose.
 
     Args:
-        rig, live, sliders, raw: see `write`.
+        rig: the character.
+        live: Runtime of the character.
+        sliders: sliders at the start of the drag.
+        raw: float32[R], wanted raw controls.
     """
     board.put_places(parts.controls_there(rig), live, sliders.places)
     values = sliders.values(raw)

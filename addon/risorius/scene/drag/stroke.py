@@ -41,7 +41,7 @@ class Options:
     Attributes:
         symmetric: move the mirrored point too.
         method: "near": few sliders that mainly move the dragged area; "least_squares": all sliders;
-            or "transpose", see solve_drag.
+            or "transpose": all sliders, in proportion to their effect on the points.
         single: move only the best control; with `symmetric` also its partner on the other side.
         choice: with `single`: 0: the best control, 1: the second best, and so on.
         region: use only controls of the region of the point.
@@ -104,7 +104,7 @@ class Stroke:
     raw: NDArray[np.float32]
     best: list[tuple[int, float, float]] = field(default_factory=list)
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)
-    _was: NDArray[np.float32] | None = None  # [V, 3], dragged mesh at the press in file space
+    _was: NDArray[np.float32] | None = None  # [V, 3], dragged mesh at press, file space
     _eases: dict[tuple[Point, ...], Float] = field(default_factory=dict)
     # float64[3]: seen minus predicted position of the point, in world space.
     _apart: Float = field(default_factory=lambda: np.zeros(3))
@@ -144,7 +144,8 @@ class Stroke:
 
         Args:
             context: has the settings for keys.
-            target, view: see `to`.
+            target: float64[3], wanted position in world space.
+            view: float64[3], a direction along which the position is free; None: no free direction.
 
         Returns:
             The names of the moved sliders.
@@ -262,7 +263,8 @@ class Stroke:
 
         Args:
             anchors: the points of the drag.
-            target, view: see `to`.
+            target: float64[3], wanted position of the dragged point in world space.
+            view: float64[3], a direction along which the position is free; None: no free direction.
         """
         goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
         shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])
@@ -294,8 +296,8 @@ class Stroke:
         return list(known.rules_of(index)[1])
 
     def _ease(self) -> Float:
-        """float64[R]: weights of the controls, larger for controls that move mainly the dragged
-        points, see local_ease."""
+        """float64[R]: weights of the controls, up to 1, larger for controls that move mainly the
+        dragged points."""
         surface, key = self.skin.surface, self.options.others
         if key not in self._eases:
             low, high = self.state.low, self.state.high

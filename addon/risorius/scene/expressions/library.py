@@ -300,7 +300,7 @@ def remove(item: Item) -> None:
         item: an expression of the grid.
 
     Raises:
-        LibraryError: the expression may not be changed, see check_own.
+        LibraryError: the expression belongs to Risorius, or its file has several expressions.
         OSError: its file cannot be removed.
     """
     check_own(item)

@@ -118,7 +118,8 @@ def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
     """float64[V, 3] for each piece: its posed vertices in file space.
 
     Args:
-        sitter, sliders: see draw.
+        sitter: the face.
+        sliders: values by property name; other sliders are at rest.
     """
     live = sitter.live
     rests = dict(zip(live.labels, live.rests, strict=True))
@@ -129,11 +130,12 @@ def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
 
 
 def draw_places(sitter: Sitter, placed: Sequence[Floats], size: int = SIZE) -> Floats:
-    """Draw a face like `draw`, with given vertices.
+    """Draw a face with given vertices, seen from the front.
 
     Args:
-        sitter, size: see draw.
+        sitter: the face.
         placed: vertices of each piece, from `places`.
+        size: width and height in pixels.
     """
     view, scale = _frame(sitter)
     high = size * _SMOOTH
@@ -192,7 +194,7 @@ def _posed(
     Args:
         live: Runtime of the character.
         piece: the mesh.
-        moves: float64[J, 4, 4], see _moves.
+        moves: float64[J, 4, 4], skinning matrices of the joints.
         channels: float32[C], weights of the blend shape channels.
     """
     points = np.asarray(live.dna.meshes[piece.index].positions, np.float64).copy()
@@ -250,7 +252,12 @@ class _Picture:
         self.shade = native.part("plot.drawing.shade")
 
     def add(self, piece: Piece, screen: Floats) -> None:
-        """Draw a mesh over the picture. Args: screen float64[V, 3], see _on_screen."""
+        """Draw a mesh over the picture.
+
+        Args:
+            piece: the mesh.
+            screen: float64[V, 3] in pixels: to the right, down, and depth towards the viewer.
+        """
         normals = self.shade.vertex_normals(screen * [1.0, -1.0, 1.0], piece.triangles)
         kept = _in_sight(screen[piece.triangles], self.high)
         triangles = piece.triangles[kept]

@@ -243,7 +243,11 @@ def _back_up(
     """Keep a copy of a mesh with edits or additions by the user, before its polygons change.
 
     Args:
-        change, item, old, shape, known: see `_things`.
+        change: the replacement.
+        item: the mesh object.
+        old: the mesh in the old file.
+        shape: positions of the mesh with the user's edits.
+        known: whether the object has as many vertices as the mesh in the old file.
     """
     things = _things(change, item, old, shape, known)
     bound = [m.name for m in item.modifiers if m.type in _BOUND]
@@ -361,7 +365,10 @@ def _refit_corners(
     """Update UVs, normals and the materials' attributes if the old and the new file differ.
 
     Args:
-        change, item, old, new, fresh: see `_refit`.
+        change: the replacement.
+        item: the existing mesh object.
+        old, new: the mesh in the old and in the new file.
+        fresh: the newly built object of the new mesh.
     """
     mesh = item.data
     layer = mesh.uv_layers.get("UVMap")
@@ -416,7 +423,10 @@ def _rebuild(
     So the shape keys, the drivers and the pointers to the datablock stay.
 
     Args:
-        change, item, new, fresh: see `_refit`.
+        change: the replacement.
+        item: the existing mesh object.
+        new: the mesh in the new file.
+        fresh: the newly built object of the new mesh.
         surface: data of the old polygons.
         bearer: converts values of old vertices to values of new vertices.
     """
@@ -457,7 +467,9 @@ def _refit_shape(
     """Set the new neutral mesh with the user's edits, and all shape keys relative to it.
 
     Args:
-        change, item, new: see `_refit`.
+        change: the replacement.
+        item: the existing mesh object.
+        new: the mesh in the new file.
         shape: positions of the mesh with the user's edits.
         bearer: converts values of old vertices to values of new vertices.
     """

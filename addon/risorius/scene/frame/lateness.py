@@ -24,7 +24,8 @@ class _Late:
 
     Attributes:
         cause: name of the control or constraint that makes the face late.
-        wiring: result of _wiring when the reason was found.
+        wiring: parent, drivers and constraints of the controls when the record was made; empty for
+            a face whose controls depend on no face.
         frames: number of late frames.
     """
 
@@ -94,7 +95,8 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
     "" if only other inputs differ, such as the level of detail.
 
     Args:
-        before, after, labels: see `count`.
+        before, after: tuples that begin with the bytes of the raw controls; other types give "".
+        labels: names of the raw controls.
     """
     if not isinstance(before, tuple) or not isinstance(after, tuple):
         return ""

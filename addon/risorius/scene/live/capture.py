@@ -73,7 +73,7 @@ def stop(controls: bpy.types.Object | None) -> bool:
     """End the capture of a character and restore its earlier values.
 
     Returns:
-        Whether a capture ran. An unfinished recording is kept, see recordings.waiting.
+        Whether a capture ran. Its unfinished recording is kept for recordings.waiting.
     """
     session = sessions.of(controls)
     if session is None:
@@ -83,7 +83,7 @@ def stop(controls: bpy.types.Object | None) -> bool:
 
 
 def stop_all() -> None:
-    """End every capture; characters that are still there get their values back."""
+    """End every capture; characters that still exist get their values from before the capture."""
     for session in sessions.running():
         _end(session)
     if bpy.app.timers.is_registered(_tick):
@@ -142,7 +142,8 @@ def finish_take(
         clip_actions.Report, or None if nothing was received.
 
     Raises:
-        clip_units.ClipError: see recordings.finish; the recording is kept in `recordings`.
+        clip_units.ClipError: no control of the recording fits this face, the recording is longer
+            than Blender can play, or the NLA is being edited. `recordings` keeps the recording.
     """
     recording = _lay_by(session)
     return recordings.finish(recording, rig, scene) if recording is not None else None

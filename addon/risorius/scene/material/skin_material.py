@@ -19,7 +19,7 @@ from .nodes import Graph, Value
 
 MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
-# Mesh attribute: x, height and distance from the mouth, see skin_folds.fold_coordinates.
+# Mesh attribute: x, height and distance from the mouth, as computed by skin_folds.fold_coordinates.
 FOLDS = "risorius_folds"
 BORDER = "risorius_border"  # mesh attribute: 1 near an open border, 0 far away
 _FRAME = "Animated maps"

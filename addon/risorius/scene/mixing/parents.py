@@ -112,7 +112,8 @@ class _Seen:
         """float64[V, 3]: vertices of the mix, in Blender's axes and units.
 
         Args:
-            shares, regions: see the function `show`.
+            shares: share of each parent; only their ratios count.
+            regions: region -> index of a parent -> share, 0 to 1, for regions with separate shares.
         """
         mixing = native.part("mixing")
         places = mixing.Places(self.parents, mixing.Mix(list(shares), regions), self.masks)

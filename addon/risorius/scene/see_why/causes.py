@@ -22,7 +22,7 @@ from . import displacement, present
 Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # deltas [J, 9], weights [B]
 _LEAST = 1e-3  # mm; smaller motions are float32 rounding of a head at 1.7 m height
 _MOST_FIRING = 24  # correctives whose motion is computed: those with the largest values
-# Session uid of a deforming armature -> last result of `of_vertex`.
+# Session uid of a deforming armature -> causes of the last examined vertex.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
 # Session uid of a deforming armature -> (inputs of `strongest`, its last result).
 _fired: dict[int, tuple[object, list[Cause]]] = session.table("causes.fired", ("undo", "load"))
@@ -87,8 +87,9 @@ class Part:
 
 
 def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
-    """Find the causes of a vertex's motion in the current pose and store them for `last`. Returns
-    None if the face has no current pose, see present.of.
+    """Find the causes of a vertex's motion in the current pose and store them for `last`.
+
+    None if the character is baked, or its data or controls are lost.
 
     Args:
         rig: deforming armature.
@@ -139,7 +140,11 @@ def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
 
 
 def last(rig: ArmatureObject) -> Found | None:
-    """The last result of `of_vertex`; None if there is none. Args: rig  deforming armature."""
+    """The stored causes of the last examined vertex; None if no vertex was examined.
+
+    Args:
+        rig: deforming armature.
+    """
     return _found.get(rig.session_uid)
 
 
@@ -222,9 +227,12 @@ def strongest(rig: ArmatureObject, count: int = 8) -> list[Cause]:
 
 
 def is_known(rig: ArmatureObject) -> bool:
-    """Whether `strongest` is computed for the current pose; True if the face has no pose.
+    """Whether the strongest correctives of the current pose are already computed.
 
-    Args: rig  deforming armature.
+    True too if the face has no current pose.
+
+    Args:
+        rig: deforming armature.
     """
     now, kept = present.of(rig), _fired.get(rig.session_uid)
     return now is None or (
@@ -233,7 +241,11 @@ def is_known(rig: ArmatureObject) -> bool:
 
 
 def known(rig: ArmatureObject) -> list[Cause]:
-    """The last result of `strongest`, perhaps for an earlier pose. Args: rig deforming armature."""
+    """The last computed strongest correctives, perhaps of an earlier pose; empty if there are none.
+
+    Args:
+        rig: deforming armature.
+    """
     return list(_fired.get(rig.session_uid, (None, []))[1])
 
 

@@ -38,8 +38,7 @@ KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
 _LEAST = 0.01  # lower limit of the millimetres of the hottest colour, so that noise looks cold
 # Session uid of a deforming armature -> values from which its colours were computed.
 _shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
-# Session uid of a deforming armature -> (kind, what) of the heat map that is removed during a save,
-# see Heat.
+# Session uid of a deforming armature -> `kind` and `what` of the Heat that is removed during a save.
 _held: dict[int, tuple[str, str]] = session.table("heat.held", ("load",))
 _PAUSE = 0.15  # seconds, at least, between two checks whether the pose has changed
 
@@ -75,7 +74,9 @@ def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Hea
 
     Args:
         rig: its deforming armature.
-        kind, what: see Heat.
+        kind: "CONTROL", "POSE", "CORRECTIVE" or "LAYER".
+        what: label of the control, index of the corrective, or index of the layer; not used for
+            "POSE".
         depsgraph: graph for reading layers.
 
     Raises:
@@ -119,10 +120,15 @@ def _is_as_imported(item: MeshObject, count: int) -> bool:
 def _distances(
     rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
 ) -> dict[int, NDArray[np.float64]]:
-    """Index of a mesh -> distances of its vertices between the poses of `_pair`, Blender units.
+    """Index of a mesh -> float64[V], distances that the heat map shows, in Blender units.
 
     Args:
-        rig, now, kind, what, depsgraph: see `_pair`.
+        rig: deforming armature.
+        now: the face in its current pose.
+        kind: "CONTROL", "POSE", "CORRECTIVE" or "LAYER".
+        what: label of the control, index of the corrective, or index of the layer; not used for
+            "POSE".
+        depsgraph: graph for reading layers.
     """
     one, other = _pair(rig, now, kind, what, depsgraph)
     meshes = displacement.meshes_at(rig, now.lod)
@@ -137,7 +143,9 @@ def _pair(
     Args:
         rig: deforming armature.
         now: the face in its current pose.
-        kind, what: see Heat.
+        kind: "CONTROL", "POSE", "CORRECTIVE" or "LAYER".
+        what: label of the control, index of the corrective, or index of the layer; not used for
+            "POSE".
         depsgraph: graph for reading layers.
     """
     evaluate = now.live.rig.evaluate

@@ -191,7 +191,7 @@ def draw(model: Model, key: str) -> Floats:
         key: name of the key.
 
     Returns:
-        The picture, see portrait.draw.
+        float64[portrait.SIZE, portrait.SIZE, 3] in [0, 1], row 0 at the bottom.
     """
     way = model.ways[key].astype(np.float64)
     length = np.linalg.norm(way, axis=1)

@@ -76,7 +76,8 @@ class _Face:
     Attributes:
         face: compiled skinning of all meshes in Direct mode.
         skins: session uid of a mesh object -> its Skin, in the order of the meshes in `face`.
-        bones, writer: see Frame.
+        bones: bones of the deforming armature.
+        writer: bone_writer.Writer of the bones that the evaluator writes.
     """
 
     face: native.DirectFace
@@ -277,7 +278,7 @@ def write(jobs: Sequence[Job]) -> None:
     """Write final vertex positions to the live shape keys of all given faces together.
 
     Args:
-        jobs: see `prepare`.
+        jobs: the faces, one Job for each.
     """
     targets = [_addresses(job.items) for job in jobs]
     done = native.module().deform_faces(

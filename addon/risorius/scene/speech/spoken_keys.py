@@ -365,7 +365,10 @@ def _samples(
     """Frames and values of a control in a span of frames, with the curve's values at both ends.
 
     Args:
-        curve, mouth, sounds, name: see `_replace`.
+        curve: the F-curve of the control's slider.
+        mouth: computes the values of the control.
+        sounds: the sounds of the voice.
+        name: name of the control.
         span: first and last frame of the action.
     """
     first, last = int(mouth.sample(span[0])), int(np.ceil(mouth.sample(span[1])))

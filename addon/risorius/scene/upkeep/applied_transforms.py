@@ -158,8 +158,13 @@ def _read(items: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.float32
 
 
 def _followed(rig: ArmatureObject) -> dict[bpy.types.Object, Matrix]:
-    """World matrices of rig and controls when the rig last followed the controls; stored states can
-    be older, because frame changes cause no update."""
+    """World matrices of rig and controls when the rig last followed the controls.
+
+    Other stored states can be older, because frame changes cause no update.
+
+    Objects with a parent or a constraint are left out. Empty for a baked character, or if the rig
+    has not followed yet.
+    """
     controls, kept = parts.controls_of(rig), last_written.places.get(rig.session_uid)
     if not isinstance(kept, bytes) or parts.BAKED in rig:
         return {}
