@@ -81,7 +81,8 @@ def write(
         owner: the datablock that will play it.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        error: largest difference of a value after the key reduction, in the units of the values;
+            0: keep every key of a curve that moves.
         counts: totals, which this call increases.
 
     Returns:
@@ -110,7 +111,8 @@ def add_tracks(
         bag: receives the F-curves; must not contain curves of these properties.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        error: largest difference of a value after the key reduction, in the units of the values;
+            0: keep every key of a curve that moves.
         counts: totals, which this call increases.
     """
     times = np.asarray(frames, np.float32)

@@ -354,7 +354,7 @@ def clip_of_action(
         rate: frames per second of the scene; frame 0 is second 0 of the clip.
 
     Returns:
-        A clip with curves of the animated sliders by their property names (see dna_names), and of
+        A clip with curves of the animated sliders by their property names, and of
         animated control bones and gaze target by the names in `clip_units.BONES`.
     """
     frames = np.asarray(frames, np.float64)

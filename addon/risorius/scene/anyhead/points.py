@@ -72,7 +72,11 @@ def of(head: bpy.types.Object) -> dict[str, Point]:
 
 
 def by_hand(points: Mapping[str, Point]) -> dict[str, Doubles]:
-    """Positions of the landmarks that the user moved or placed. `points` is the result of `of`."""
+    """Name -> position of the landmarks that the user moved or placed, in the head's object space.
+
+    Args:
+        points: all landmarks of the head by name.
+    """
     return {name: point.place for name, point in points.items() if point.state != FOUND}
 
 

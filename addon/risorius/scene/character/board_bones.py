@@ -193,7 +193,7 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
 def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
     """The position and unit of a primary board, which is beside the head meshes.
 
-    The primary board has about 30 handles, see primary_table.
+    The primary board has about 30 handles, which primary_table.py defines.
     """
     middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
     return _Place(Vector(middle), unit)

@@ -90,7 +90,11 @@ class Skin:
         return flat.reshape(-1, 3).astype(np.float64) @ place[:3, :3].T + place[:3, 3]
 
     def seen_at(self, point: Point) -> Float | None:
-        """float64[3]: one vertex of the result of `seen`, or None. Args: point  mesh and vertex."""
+        """float64[3]: one evaluated vertex in world space; None in the same cases as `seen`.
+
+        Args:
+            point: index of the mesh in the DNA file, and vertex.
+        """
         data, place = self._evaluated(point[0])
         if data is None:
             return None

@@ -230,7 +230,13 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
 def _note_keys(
     frame: float, armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
 ) -> None:
-    """Tell shown_keys and tweak_guard that Blender's operators may have set keys or moved bones."""
+    """Show keys, and move keys into tweaks, that Blender's operators may have just set.
+
+    Args:
+        frame: current frame of the scene.
+        armatures: edited armature objects.
+        actions: edited actions.
+    """
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         data = controls.animation_data if controls is not None else None

@@ -55,7 +55,7 @@ class ShipOptions:
 def sampled(
     context: Context, rigs: Sequence[ArmatureObject], options: ShipOptions
 ) -> Generator[float, None, list[tuple[ArmatureObject, int, sampling.Samples]]]:
-    """Sample characters for `copies` or `clip`; a generator like sampling.sample.
+    """Sample characters for an export; a generator that yields progress and can be cancelled.
 
     Args:
         context: scene and view layer to sample.

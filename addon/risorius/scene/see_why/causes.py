@@ -24,7 +24,8 @@ _LEAST = 1e-3  # mm; smaller motions are float32 rounding of a head at 1.7 m hei
 _MOST_FIRING = 24  # correctives whose motion is computed: those with the largest values
 # Session uid of a deforming armature -> causes of the last examined vertex.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
-# Session uid of a deforming armature -> (inputs of `strongest`, its last result).
+# Session uid of a deforming armature -> ((id of its Runtime, raw controls, LOD) of a pose, the
+# strongest correctives of this pose).
 _fired: dict[int, tuple[object, list[Cause]]] = session.table("causes.fired", ("undo", "load"))
 
 

@@ -38,7 +38,7 @@ KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
 _LEAST = 0.01  # lower limit of the millimetres of the hottest colour, so that noise looks cold
 # Session uid of a deforming armature -> values from which its colours were computed.
 _shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
-# Session uid of a deforming armature -> `kind` and `what` of the Heat that is removed during a save.
+# Session uid of a deforming armature -> `kind` and `what` of the Heat that is removed for a save.
 _held: dict[int, tuple[str, str]] = session.table("heat.held", ("load",))
 _PAUSE = 0.15  # seconds, at least, between two checks whether the pose has changed
 

@@ -134,7 +134,8 @@ def change(action: bpy.types.Action, sounds: Sequence[Sound]) -> int:
         The number of curves with new keys.
 
     Raises:
-        SpokenError: see rebuild; the list is then unchanged.
+        SpokenError: the voice cannot be corrected, and its list is unchanged; or `sounds` is empty
+            or not in the order of time, and the list is already replaced.
     """
     _check(action)
     _fill(of(action), sounds)
@@ -182,7 +183,8 @@ def rebuild(action: bpy.types.Action) -> int:
         The number of curves with new keys.
 
     Raises:
-        SpokenError: the list is damaged, or no slider of the mouth has keys in this action.
+        SpokenError: the action has no voice or is linked, the list is damaged, or no slider of the
+            mouth has keys in this action.
     """
     curves = _check(action)
     said, old, new = of(action), _built(action), sounds_of(action)
