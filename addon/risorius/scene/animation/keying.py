@@ -213,7 +213,7 @@ def changed(
         context: has the settings and the frame.
         rig: the character.
         labels: changed sliders.
-        bones: data paths of moved control bones, as in Pose.
+        bones: data paths of the moved control bones' rotations and locations.
 
     Returns:
         The number of keyed properties.

@@ -80,7 +80,8 @@ def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Hea
         depsgraph: graph for reading layers.
 
     Raises:
-        FaceError: the control, corrective or layer does not exist, or nothing can be coloured.
+        FaceError: the character is baked or incomplete, the control, corrective or layer does not
+            exist, or no mesh can be coloured.
     """
     now = present.of(rig)
     if now is None:
