@@ -4,7 +4,8 @@
     blender -b --python extension_steps.py -- STEP [ARGUMENTS]
     python extension_steps.py -- STEP [ARGUMENTS]
 
-It prints its result as one line of JSON after `RESULT `. An exception gives exit code 1.
+The script prints the result of the step as one line of JSON after `RESULT `. An exception gives
+exit code 1.
 """
 
 import json

@@ -19,11 +19,11 @@ from ...logic.animation import track_matching
 from ..base import compat, saved
 from ..base.blender_types import Animated
 
-BEFORE = "risorius_before"  # on a datablock with a baked action: its earlier animation
+BEFORE = "risorius_before"  # on a datablock with a baked action: its animation before the bake
 BAKED_ACTION = "risorius_baked_action"  # marks a baked action, which `restore` removes
 _DIGEST = "risorius_digest"  # on a baked action: digest of its keys after the bake
 _LINEAR = 1  # number of Blender's interpolation "LINEAR"
-_AT_ONCE = 1 << 21  # values (frames times columns) that are reduced in one call
+_AT_ONCE = 1 << 21  # approximate number of values (frames times columns) reduced in one call
 
 
 @dataclass
@@ -34,8 +34,8 @@ class Track:
         path: data path of the property.
         group: name of the group of its F-curves.
         values: float32[frames, width], the components of the property at each frame.
-        now: float[width], current value of the property in the scene. A property that has this
-            value at all frames needs no curve. None: always make a curve.
+        now: float[width], current value of the property in the scene. `write` makes no curve of a
+            property that has this value at all frames. None: always make a curve.
         first: array index that the first column of values animates.
         indexed: whether the property is an array.
     """
@@ -81,7 +81,8 @@ def write(
         owner: the datablock that will play it.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        error: largest difference of a value after the key reduction, in the units of the values;
+            0: keep every key of a curve that moves.
         counts: totals, which this call increases.
 
     Returns:
@@ -110,7 +111,8 @@ def add_tracks(
         bag: receives the F-curves; must not contain curves of these properties.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        error: largest difference of a value after the key reduction, in the units of the values;
+            0: keep every key of a curve that moves.
         counts: totals, which this call increases.
     """
     times = np.asarray(frames, np.float32)
@@ -128,8 +130,15 @@ def _reduced(
     frames: NDArray[np.float64], tracks: Sequence[Track], error: float, counts: Counts
 ) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
     """Yields each track, its values [frames, width], and a mask of the keys that remain after the
-    reduction, bool[frames, width]."""
-    most = max(_AT_ONCE // len(frames), 16)  # columns
+    reduction, bool[frames, width].
+
+    Args:
+        frames: float64[N], frames of the scene.
+        tracks: values of the properties at these frames.
+        error: largest error of the key reduction; 0: keep all keys.
+        counts: totals, which this call increases.
+    """
+    most = max(_AT_ONCE // len(frames), 16)  # columns to collect before a reduction
     waiting, width = [], 0
     for number, track in enumerate(tracks):
         waiting.append(track)
@@ -152,7 +161,7 @@ def _reduced(
 def _new_curve(bag: bpy.types.ActionChannelbag, track: Track, index: int) -> bpy.types.FCurve:
     rna: Any = bag.fcurves.bl_rna
     words = rna.functions["new"].parameters.keys()
-    for word in ("action_group", "group_name"):  # argument in Blender up to 4.3; since 5.0
+    for word in ("action_group", "group_name"):  # name of the argument up to Blender 4.3; since 5.0
         if word in words:
             return bag.fcurves.new(track.path, index=index, **{word: track.group})
     curve = bag.fcurves.new(track.path, index=index)
@@ -203,7 +212,7 @@ def play(
     muted: Collection[str] = (),
     strip: bool = False,
 ) -> None:
-    """Let a datablock play a baked action and no other animation.
+    """Let a datablock play a baked action and no other action or NLA strip.
 
     The earlier animation of the datablock is stored for `restore`.
 
@@ -211,7 +220,7 @@ def play(
         owner: object or shape keys that play the action.
         action, slot: the results of `write`.
         muted: data paths of baked properties, whose drivers are muted.
-        strip: put the action on a new NLA track instead of making it the active one.
+        strip: put the action on a new NLA track instead of making it the active action.
     """
     keep(owner)
     data = owner.animation_data
@@ -380,9 +389,9 @@ def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
 
 
 def note_tracks_by_name(owner: Animated) -> bool:
-    """Convert stored states of NLA tracks from the format of old .blend files to texts of `_noted`.
+    """Convert the stored states of NLA tracks from the format of old .blend files to JSON texts.
 
-    The old format stores no track names, only the states in the order of the tracks.
+    The old format stores mute and solo in the order of the tracks; the texts have names too.
 
     Returns:
         Whether the stored states had the old format and were converted.
@@ -437,7 +446,8 @@ def _baked_strips(
 ) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
     """The NLA strips that play the baked action, each with its track.
 
-    Strips and tracks that the user renamed or moved are found too.
+    Strips and tracks that the user renamed or moved are found too. If no strip plays the stored
+    action, strips of other baked actions on the track with the stored name are found.
     """
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
     baked = state.get("baked")

@@ -123,7 +123,7 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
         board_bones.show(controls, False)
         return done
     before, done = done, switch(rig, by_board=True, with_keys=True)
-    if done.kept is not None and before.kept is not None:  # the action with slider keys
+    if done.kept is not None and before.kept is not None:  # done.kept has slider keys
         bpy.data.actions.remove(done.kept)
         done.kept = before.kept
     return done
@@ -137,7 +137,7 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
         action: an action that no other datablock plays.
 
     Returns:
-        Sentences for a report.
+        Sentences for a report; empty if the sliders lead.
     """
     if not board.leads_face(rig):
         return []
@@ -163,7 +163,7 @@ def animates_sliders(rig: ArmatureObject) -> bool:
 def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
     """Convert the current pose to the board or to the sliders.
 
-    Returns: the changes of raw controls by the conversion.
+    Returns: the changes of raw controls by the conversion; no changes if it was to the sliders.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
@@ -205,7 +205,7 @@ def convert(
 
     Returns:
         The largest changes of raw controls at whole frames and at keys, and the number of new
-        curves.
+        curves. From handles to sliders, only the key reduction changes raw controls.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     curves = list(_leading_curves(action, controls, live, not by_board))

@@ -64,7 +64,7 @@ def colour_group(group: bpy.types.ActionGroup, region: str) -> None:
 
 
 def colour_curve(curve: bpy.types.FCurve, label: str, step: int | None = None) -> None:
-    """Give a new F-curve and its group the colour of a slider's region.
+    """Give a new F-curve the colour of a slider's region, and its group too if that has no colour.
 
     Args:
         curve: F-curve of a slider, in its group.

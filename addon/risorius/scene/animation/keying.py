@@ -162,7 +162,8 @@ def by_hand(
         context: has the settings and the current frame.
         rig: the character.
         move: a function that moves sliders and bones from their current values. It returns the
-            names of all sliders that it set, even to equal values; None if it did nothing.
+            names of all sliders that it set, even to equal values; None if it did nothing. At the
+            current frame, a slider that was set to an equal value is keyed if it has an F-curve.
         at_selected: True: move at every frame with a selected key of this face, and key all
             changes; False: move at the current frame.
         at: a function that is called before each move; its argument is the frame of the move.
@@ -212,7 +213,7 @@ def changed(
         context: has the settings and the frame.
         rig: the character.
         labels: changed sliders.
-        bones: data paths of moved control bones, as in Pose.
+        bones: data paths of the moved control bones' rotations and locations.
 
     Returns:
         The number of keyed properties.
@@ -430,9 +431,9 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of the newest key of a curve with at most two keys."""
+    """Set interpolation and handle types of the last key in time, if a curve has at most two."""
     if len(curve.keyframe_points) > 2:
-        return  # Blender copied them from the previous key
+        return  # Blender copied both settings from the previous key
     for key in (
         curve.keyframe_points[-1:] if len(curve.keyframe_points) > 1 else curve.keyframe_points
     ):

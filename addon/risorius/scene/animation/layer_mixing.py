@@ -70,7 +70,7 @@ class Bones:
 class Kept:
     """Cache of compiled layer sources (clips or poses) and of compiled masks.
 
-    The settings of a layer, see `_key`, identify its source and its mask.
+    The keys are the settings of a layer that determine its source or its mask.
     """
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
@@ -146,7 +146,8 @@ def mix(
         maximum: largest value of a slider.
 
     Returns:
-        float32[R] slider values and control bones with the layers applied.
+        float32[R] slider values and control bones with the layers applied; `raw` and `bones`
+        themselves if the character has no layer or its controls are baked.
     """
     controls = seen.original
     if not layers.has_any(controls) or parts.BAKED in controls:
@@ -267,7 +268,13 @@ def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> n
 
 
 def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
-    """Fire all reactions of the character, so that frames can be evaluated in any order."""
+    """Fire all reactions of the character, so that frames can be evaluated in any order.
+
+    Args:
+        stack: the compiled layers; reactions that cannot be fired are added to its problems.
+        controls: control armature of the character.
+        rate: frames per second.
+    """
     stack.mixer.clear_fired()
     for reaction in layers.reactions_of(controls):
         try:

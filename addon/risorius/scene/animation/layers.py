@@ -114,6 +114,7 @@ def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
     """Add a warp point at a scene frame, with the frame of the animation that the layer shows then.
 
     The first warp point also adds one at each end of the layer, so that the timing does not change.
+    A frame that has a warp point gets no second one.
     """
     span = span_of(layer)
     shown = float(span.source(np.array([frame]))[0])
@@ -136,7 +137,7 @@ def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> R
 
     Args:
         controls: control armature.
-        kind: see layer_properties.KINDS.
+        kind: source of the layer: "ACTION", "EXPRESSION" or "IDLE".
         name: name in the list; a number is added if another layer has it.
         settings: other properties of the layer by name.
 
@@ -192,10 +193,11 @@ def place_of(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> int:
 
 
 def remove(controls: ArmatureObject, place: int) -> None:
-    """Remove a layer, and the keys of its weight unless another character plays them.
+    """Remove a layer, and the driver and the keys of its weight.
 
-    The collection entry stays, hidden, while an action has keys for its index, so that these keys
-    move no other layer.
+    The keys stay in linked actions and in actions that another datablock uses too. The collection
+    entry stays, hidden, while an action has keys for its index or a later entry exists, so that
+    keys move no other layer. In a library override it always stays.
 
     Args:
         controls: control armature of the character.
@@ -283,7 +285,8 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
     """Yields collections of F-curves that belong to this armature alone.
 
-    These are the F-curves of each action that only this armature plays, and its drivers.
+    Each action that only this armature uses gives its F-curves; the last collection has the
+    drivers of the armature. Linked actions are left out.
     """
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
@@ -321,6 +324,9 @@ def copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
 
 def keep_weights(controls: ArmatureObject, before: bpy.types.Action | None) -> None:
     """Copy the keys of layer weights from the earlier action to the active action.
+
+    If there is no active action, a new action is made. A weight that has keys in the active action
+    keeps them.
 
     Args:
         controls: control armature.

@@ -22,7 +22,7 @@ SWITCH = "risorius_use_range"
 SOURCE = "risorius_range_source"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 _LEAST, _MOST = 0.1, 1.9  # limits of extreme minus neutral, equal to the limits in risorius.ranges
-# Counts the changes of ranges of all faces, so that caches notice them (see `changes`).
+# Number of changes of the capture ranges of all faces, which caches compare.
 _changes = session.value("range_properties.changes", 0, ("unregister",))
 
 
@@ -88,7 +88,7 @@ def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
 
 
 def all_of(controls: ArmatureObject) -> "native.Ranges":
-    """The ranges of a face, even if the use of ranges is switched off.
+    """The capture ranges of a face, even if the use of ranges is switched off.
 
     Args:
         controls: the control armature. A control with an invalid range counts as switched off.

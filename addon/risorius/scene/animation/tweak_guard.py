@@ -62,7 +62,7 @@ class _Hand:
 
 @dataclass
 class _Below:
-    """Cached pose of the controls without the tweak, for a face with NLA strips.
+    """Cached pose of the controls without the tweak, for a face with NLA strips or blending.
 
     Attributes:
         frame: frame of the scene.
@@ -167,7 +167,8 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
     """The pose of the controls without the tweak.
 
-    On a face with NLA strips the pose is cached, because Blender has to evaluate the strips.
+    On a face with NLA strips or a blended active action the pose is cached, because Blender has to
+    evaluate it.
     """
     if not tweaks.is_mixed(controls):
         return tweaks.below_at(controls, tweak, frame)
@@ -277,7 +278,18 @@ def _hands_of(
     inserted: dict[CurveName, list[float]],
     frame: float,
 ) -> list[_Hand]:
-    """A _Hand for each frame with new keys, the current frame last."""
+    """A _Hand for each frame with new keys, ascending, but the current frame last.
+
+    If the current frame has no new key but controls that the user moved there without a key, the
+    _Hand of these controls is the first.
+
+    Args:
+        controls: the control armature.
+        tweak: the active tweak.
+        curves: the curves of the active action, by data path and index.
+        inserted: curve's data path and index -> frames of its new keys.
+        frame: current frame of the scene.
+    """
     held = _hands.get(controls.session_uid)
     by_frame: dict[float, list[bpy.types.FCurve]] = {}
     for name, frames in inserted.items():
@@ -316,7 +328,7 @@ def _take_all(
     Then reset controls that were keyed at other frames: they get the values that they have at the
     current frame without the tweak.
 
-    hands: the moved controls, one _Hand for each frame; the last is of the current frame.
+    hands: the moved controls, one _Hand for each frame, from `_hands_of`.
     """
     with tweaks.curves_so_far(controls) as old:
         for hand in hands:
@@ -353,7 +365,8 @@ def _inserted(
 ) -> list[float] | None:
     """The frames of keys of `curve` that its earlier copy `before` lacks or has with other values.
 
-    None if the keys differ in another way, for example because keys were deleted.
+    None if the keys differ in another way: keys were deleted or moved in time, or without a new
+    key, the value of a key at a frame other than `frame` was changed.
     """
     frames, values = clip_actions.key_points(curve)
     if before is None:

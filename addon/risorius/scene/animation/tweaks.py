@@ -32,7 +32,7 @@ _REST = (0.0, 0.0, 0.0)  # rest location of the gaze target
 _FARTHEST = (179.0, 89.0, 179.0)  # degrees of yaw, pitch and roll that a layer can hold
 
 
-Curves = Mapping[tuple[str, int], bpy.types.FCurve]  # by data path and index
+Curves = Mapping[tuple[str, int], bpy.types.FCurve]  # by data path and array index
 Rows = dict[str, tuple[float, ...]]
 
 
@@ -123,7 +123,7 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
     Args:
         controls: the control armature.
         first, last: first and last frame of the tweak.
-        fade: length of the fade at each end in frames.
+        fade: length of the fade at each end in frames; at most half the range is used.
 
     Raises:
         FaceError: the range is shorter than two frames, or the fade is negative.
@@ -269,7 +269,17 @@ def _bone_rows(
     weight: float,
     held: bool,
 ) -> dict[str, list[float]]:
-    """Data path -> key values with which the tweak's layer reproduces the current bone poses."""
+    """Data path -> key values with which the tweak's layer reproduces the current bone poses.
+
+    Args:
+        controls: the control armature.
+        asked: data path -> name of the bone, for the properties to store.
+        below: the pose without the tweak.
+        old: curves of the tweak's layer, to which the changes are added.
+        frame: frame of the scene.
+        weight: weight of the layer at this frame.
+        held: True: properties without a change get keys too if the layer has keys of them.
+    """
     rows = {}
     for path, name in asked.items():
         bone = controls.pose.bones[name]
@@ -387,7 +397,8 @@ def put(controls: ArmatureObject, stand: Stand) -> None:
 def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
     """The pose of the controls without the tweak.
 
-    On a face with NLA strips, Blender evaluates the pose in a separate dependency graph.
+    On a face with NLA strips or a blended active action, Blender evaluates the pose in a separate
+    dependency graph.
 
     Args:
         controls: the control armature.

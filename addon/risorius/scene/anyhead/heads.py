@@ -15,7 +15,8 @@ from . import points
 
 def head_of(context: Context) -> MeshObject | None:
     """The head of a selected landmark, a selected mesh with landmarks, the active mesh, or the
-    selected mesh with most vertices, in this order. None if only parts of faces are selected.
+    selected mesh with most vertices, in this order. Meshes of imported faces and meshes without
+    polygons do not count; None if no other mesh is selected.
 
     Args:
         context: has the selection.

@@ -45,7 +45,8 @@ class BakeOptions:
         lod: level of detail of a RESULT; -1: the level in the viewport.
         wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; the others get no
             animation.
-        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        error: largest difference of a value after the key reduction, in the units of the values;
+            0: keep every key of a curve that moves.
         strip: True: add the actions as strips of new NLA tracks; False: make them active.
     """
 
@@ -131,7 +132,7 @@ def bake(
 
     Raises:
         BakeError: a character cannot be baked; none was baked.
-        ValueError: the range has no frame.
+        ValueError: the range ends before it starts, or the step is not above 0.
     """
     for rig in rigs:
         trouble = refusal(rig, options.kind) or controls_ahead.examine(

@@ -276,10 +276,12 @@ class _Reader:
     def _read_control_bones(
         self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Store the matrices of the control bones for one frame, see Samples.basis.
+        """Store the matrices of the control bones, relative to their rest pose, for one frame.
 
-        Args: number  index of the frame, seen  the evaluated control armature, own  rotations and
-        gaze target after the layers are mixed.
+        Args:
+            number: index of the frame.
+            seen: the evaluated control armature.
+            own: rotations and gaze target after the layers are mixed.
         """
         basis = self.samples.basis
         for name, matrices in basis.items():

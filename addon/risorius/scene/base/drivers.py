@@ -58,6 +58,9 @@ class Entries:
     Args:
         rig: deforming armature.
         labels: "channels" and "maps" -> (labels in the old order, labels in the new order).
+
+    Attributes:
+        gone: old labels of channels and maps that drivers read and the new order lacks.
     """
 
     def __init__(
@@ -96,6 +99,11 @@ class Entries:
         """Data path of a property with value 0 that replaces a removed channel or map.
 
         Drivers that read the removed channel or map stay valid with this path.
+
+        Args:
+            target: a driver target that reads the channel or map.
+            array: "channels" or "maps".
+            label: label of the removed channel or map.
         """
         key = _gone_key(array, label)
         assert target.id is not None

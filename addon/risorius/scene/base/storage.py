@@ -24,7 +24,7 @@ _LENGTH = "risorius_length"  # length of the unpacked file in bytes; missing in 
 # DNA files pack to between a half and a fifth of their size. A file that would unpack to more than
 # this limit is stored uncompressed.
 _MOST_TIMES = 32
-_ALWAYS = 1 << 16  # bytes
+_ALWAYS = 1 << 16  # bytes that every file may unpack to
 _PIECE = 1 << 20  # bytes that are unpacked at once
 _SIGNATURE = b"DNA"  # first bytes of every DNA file
 

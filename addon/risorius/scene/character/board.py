@@ -288,7 +288,8 @@ def fit(
         live: the character's Runtime.
         raw: float[N, R], wanted values of raw controls at N frames.
         start: float[N, G], start of the search; None: the raw values converted by the rig's
-            raw_to_gui, or 0 if the DNA file has no table from GUI controls to raw controls.
+            raw_to_gui, or 0 if the table is not from the DNA file: for the primary board, or if the
+            file has no GUI controls.
 
     Returns:
         float64[N, G], values of GUI controls.

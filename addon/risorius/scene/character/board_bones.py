@@ -27,8 +27,8 @@ from . import armatures, board, bone_shapes, runtime
 
 COLLECTION = "Face Board"
 BORDER, FRAMES = runtime.BOARD_BONES
-_SHARE = 1.3  # height of the board divided by the size of the head
-_AWAY = 0.42  # distance from the head to the board divided by the size of the head
+_SHARE = 1.3  # height of a complete board / largest extent of the meshes and joints of the face
+_AWAY = 0.42  # distance from the face to a complete board / the same extent
 _SIDE_COLOURS = {"L": (0.25, 0.6, 1.0), "R": (1.0, 0.35, 0.3), "": (1.0, 0.8, 0.2)}
 _LINE_COLOUR = (0.8, 0.8, 0.82)
 _BORDER_COLOUR = (0.25, 0.75, 0.45)
@@ -193,7 +193,7 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
 def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
     """The position and unit of a primary board, which is beside the head meshes.
 
-    The primary board has about 30 handles, see primary_table.
+    The primary board has about 30 handles, which primary_table.py defines.
     """
     middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
     return _Place(Vector(middle), unit)
@@ -238,7 +238,15 @@ def _build(
     layout: Board,
     middle: Vector,
 ) -> None:
-    """Create bones in board units around the board's centre; the bone `board` scales them."""
+    """Create bones in board units around the board's centre; the bone `board` scales them.
+
+    Args:
+        edit_bones: edit bones of the control armature.
+        bars: the missing names of runtime.BOARD_BONES.
+        new: handles without a bone.
+        layout: the whole board.
+        middle: centre of the board, in the space of the armature.
+    """
     for name in bars:
         bone = edit_bones.new(name)
         head = middle + Vector((0.0, 0.3, 0.0)) if name == FRAMES else middle  # behind handles

@@ -123,7 +123,7 @@ class Runtime:
 
     @cached_property
     def handles(self) -> list[board_layout.Handle]:
-        """The handles of the face board. Their positions on a complete board are not set here."""
+        """The handles of the face board. Only the handles of a primary board have positions."""
         taken = (*CONTROL_BONES, *BOARD_BONES)
         if self.board == PRIMARY:
             return primary_table.handles_of(self.table, {}, taken)
@@ -155,8 +155,9 @@ class Turning:
         bone: the control bone that rotates the joint, "neck" or "head"; "": none.
         share: fraction of the control bone's rotation that the joint gets, 0 to 1.
         armature_axes: matrix that converts the vector part of a quaternion from the armature's
-            axes to the file's.
-        bone_axes: matrix that converts it from the axes of the joint's bone to the file's.
+            axes to the joint's axes in the file.
+        bone_axes: matrix that converts the vector part of a quaternion from the axes of the joint's
+            bone to the joint's axes in the file.
     """
 
     joint: int
@@ -386,6 +387,12 @@ def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> fl
     """The rotation of an eye by a look control at value 1, in radians.
 
     DEFAULT_EYE_ANGLE is returned if the eye rotates by less than 2 degrees or has no joint.
+
+    Args:
+        runtime: the Runtime of the character.
+        control: index of the look control.
+        side: "L" or "R".
+        horizontal: True: yaw; False: pitch.
     """
     joint = runtime.anchors.eyes.get(side)
     if joint is None:

@@ -44,7 +44,7 @@ def begin(reader: str) -> None:
 
 
 def end(reader: str) -> None:
-    """Allow Direct mode again. Args: reader  see `begin`."""
+    """Let faces use Direct mode again. Args: reader  the DIALOG or GLTF of the call of `begin`."""
     names = _held.pop(reader, None)
     if names is None:
         return

@@ -32,6 +32,8 @@ class Sound:
 def first_sound(scene: bpy.types.Scene, start: float, end: float, rate: float) -> Sound | None:
     """The first audible sound strip in a range of frames, or None.
 
+    Strips without a file, and with files of formats that a page cannot play, are left out.
+
     Args:
         scene: has the sequencer.
         start, end: first and last frame of the range.

@@ -26,7 +26,7 @@ RISORIUS, LIBRARY, FILE = "RISORIUS", "LIBRARY", "FILE"
 MARK = "risorius_expression"  # on an action and its asset: the text of the expression
 _FAVOURITES = "favourites.txt"
 _MOST = 2000  # largest number of files that are read from a library
-_AT_ONCE = 100  # expressions that are written together, all or none
+_AT_ONCE = 100  # number of expressions that are written together, all or none
 
 
 class LibraryError(FaceError):
@@ -300,7 +300,7 @@ def remove(item: Item) -> None:
         item: an expression of the grid.
 
     Raises:
-        LibraryError: the expression may not be changed, see check_own.
+        LibraryError: the expression belongs to Risorius, or its file has several expressions.
         OSError: its file cannot be removed.
     """
     check_own(item)

@@ -95,10 +95,11 @@ def shapes_of(
 
     Args:
         context: its scene gives the unit.
-        item: mesh object of the head with shape keys, see usable_head.
+        item: mesh object of the head with shape keys.
         others: meshes that belong to the head: teeth, eyes, hair.
         height_mm: the head is scaled to this height from chin to top of the head; 0: no scaling.
-        said: the user's assignment of shape keys to controls, see risorius.author.input.said.
+        said: name of a shape key -> the user's meaning: a raw control without prefix, "=" and an
+            ARKit unit, "@" and an expression, or a list of raw controls; [] leaves the key out.
 
     Raises:
         HeadError: the shape keys are not relative, or the mesh has no polygons.
@@ -135,8 +136,12 @@ def _axes(context: Context) -> Doubles:
 def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
     """The neutral mesh of an object without its shape keys; its Mirror modifiers are applied.
 
+    If the object has a shown Mirror modifier, its shape keys are included at their current values.
+
     Args:
-        context, item, head: see part_of.
+        context: its scene gives the unit.
+        item: the object.
+        head: mesh object of the head; its location becomes the origin.
     """
     author, heads = native.part("author.input.obj"), native.part("author.heads.parts")
     keys, whole = item.data.shape_keys, _mirrored(context, item)
@@ -154,7 +159,7 @@ def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native
 
 
 def _mirrored(context: Context, item: MeshObject) -> bpy.types.Mesh | None:
-    """A new mesh with the Mirror modifiers of an object applied; None if it has none."""
+    """A new mesh with the shown Mirror modifiers of an object applied; None if there is none."""
     kinds = [modifier.type for modifier in item.modifiers if modifier.show_viewport]
     if "MIRROR" not in kinds:
         return None
@@ -266,7 +271,7 @@ def rig_task(
     Args:
         shapes: the head and its shapes, from shapes_of.
         wishes: options of the rig.
-        said: the user's assignment of shape keys to controls, see risorius.author.input.said.
+        said: name of a shape key -> the user's meaning, in the form that shapes_of describes.
     """
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Rigged:
@@ -285,7 +290,9 @@ def make_rig(
     """Make a joint rig and write its DNA file and expressions, without using Blender data.
 
     Args:
-        shapes, wishes, said: see rig_task.
+        shapes: the head and its shapes, from shapes_of.
+        wishes: options of the rig.
+        said: name of a shape key -> the user's meaning, in the form that shapes_of describes.
         progress: function that is called with the progress, 0 to 1.
         cancelled: function that returns whether to stop; then no file is written.
     """
@@ -317,11 +324,10 @@ def joint_rig(
     Args:
         dna: the face with blend shapes.
         wishes: options of the rig.
-        kept: texts; a mesh whose name contains one of them keeps its skin weights and blend shapes,
-            see RigOptions.
+        kept: texts; a mesh whose name contains one of them keeps its skin weights and blend
+            shapes.
         progress: function that is called with the progress, 0 to 1; it returns False to cancel.
-        fit_vertices: number of vertices to which joints are fitted, see RigOptions; None: the
-            default.
+        fit_vertices: number of vertices to which joints are fitted; None: the default number.
     """
     author = native.part("author")
     options = author.RigOptions(

@@ -60,7 +60,7 @@ def follow_object(context: Context, controls: ArmatureObject, item: bpy.types.Ob
     """Let the eyes look at an object.
 
     Args:
-        context: see follow_head.
+        context: Blender context; its depsgraph has the evaluated bones.
         controls: control armature of the character.
         item: an object outside the character.
     """

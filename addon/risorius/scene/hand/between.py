@@ -53,9 +53,10 @@ def next_key(
     """The frame of the next or previous keyframe; None if there is no such keyframe.
 
     Args:
-        controls, paths: see key_frames.
+        controls: the control armature.
         frame: current frame.
         forward: True: next; False: previous.
+        paths: data paths whose keyframes count; None: all sliders and control bones.
     """
     frames = key_frames(controls, paths)
     there = [f for f in frames if (f > frame + _AT if forward else f < frame - _AT)]
@@ -132,7 +133,7 @@ def move(
         paths: data paths of the controls to move.
 
     Returns:
-        Names of the moved sliders.
+        Names of the sliders with a path in `paths`, even if their values do not change.
     """
     controls = parts.controls_there(rig)
     values = {

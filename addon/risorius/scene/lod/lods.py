@@ -85,7 +85,7 @@ def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) 
     Args:
         rig: the deforming armature.
         enable: True: on; False: off.
-        size: size of the face in Blender units, for initial distances.
+        size: size of the face in Blender units, for initial distances; None: 0.25.
     """
     levels = built(rig)
     if enable and levels and not distances(rig):
@@ -102,7 +102,7 @@ def expected(rig: ArmatureObject, rendering: bool, last: int | None) -> int:
     Args:
         rig: the deforming armature.
         rendering: whether the frame is rendered.
-        last: the level of the frame before, if there was one.
+        last: the level of the last evaluation; None if there was none.
     """
     if by_distance(rig) and last is not None:
         return last

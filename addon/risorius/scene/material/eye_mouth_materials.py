@@ -62,9 +62,10 @@ def _textured_normal(graph: Graph, look: Look) -> Socket | None:
 def eyes(graph: Graph, look: Look) -> None:
     """Build the material of eyes: sclera with veins, hollow iris and pupil.
 
-    The clear coat over all three is the cornea. The coat keeps the smooth normal of the eyeball, so
-    that the highlight is round. The hollow iris is lit on the side away from the light, as
-    refraction lights a real iris.
+    With a separate cornea mesh and a colour texture, the iris is dry and only the sclera is wet.
+    Otherwise the clear coat over all three is the cornea. The coat keeps the smooth normal of the
+    eyeball, so that the highlight is round. The hollow iris is lit on the side away from the light,
+    as refraction lights a real iris.
 
     Args:
         graph: Graph of the material.

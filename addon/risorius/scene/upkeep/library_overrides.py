@@ -138,7 +138,10 @@ def unlock_shapes(rig: ArmatureObject) -> bool:
 
 
 def trouble(rig: ArmatureObject) -> str:
-    """A sentence about refused writes to an override; empty if none was refused."""
+    """A sentence about refused writes to an override, or about an override that is not editable.
+
+    Empty if there is no such trouble.
+    """
     names = [item.name for item in evaluate.refused(rig)]
     if rig.override_library is not None and rig.override_library.is_system_override:
         names = names or [rig.name]
