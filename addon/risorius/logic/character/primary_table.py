@@ -19,7 +19,7 @@ from .board_letters import Point
 from .board_table import BoardTable, Row
 
 Led = Mapping[str, float]  # raw control without prefix and side -> weight
-_CLEAR = 0.05  # smallest measured sideways motion that decides a direction
+_CLEAR = 0.05  # smallest sideways share of the measured motion that decides a direction
 
 
 @dataclass(frozen=True)
