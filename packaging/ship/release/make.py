@@ -161,6 +161,9 @@ def make_repository(out: Path, packages: list[Path]) -> None:
     Args:
         out: the folder; its content is deleted first.
         packages: one zip for each platform.
+
+    Raises:
+        SystemExit: Blender's tool fails or leaves out a zip.
     """
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
