@@ -104,7 +104,8 @@ class Keys:
         controls: keys of the sliders, by their property names.
         turns: bone -> frames float64[n] and unit quaternions float64[n, 4], w first, in the axes of
             the control armature.
-        unknown: names of curves in the clip for which this face has no control.
+        unknown: names of curves in the clip that are neither a control of this face nor an angle of
+            a bone.
         dropped: number of samples that were left out because they were not finite. The angles of a
             bone at one frame count as one sample.
     """

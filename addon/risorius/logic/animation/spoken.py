@@ -180,7 +180,8 @@ def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
     """Remove sounds. The sound before the removed ones is extended to fill their time.
 
     If the first sounds of the list are removed, the sound after them begins earlier instead. If the
-    first sound of a word is removed, the next sound gets the word, unless it is silence.
+    first sound of a word is removed, the next sound gets the word, unless this sound is silence or
+    begins another word.
 
     Args:
         sounds: the list.

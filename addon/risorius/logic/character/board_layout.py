@@ -93,7 +93,7 @@ class Board:
 
     Attributes:
         handles: its handles.
-        lines: frames and labels of the handles.
+        lines: frames and labels of the handles, and titles and outlines around them.
         border: outline of the board, for selecting the board.
         width, height: size of the outline.
     """

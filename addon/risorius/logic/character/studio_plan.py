@@ -2,8 +2,8 @@
 """Places camera, lights and backdrop of a portrait around a head.
 
 All places are in the head's axes: the face looks along -y, z is up, and the origin is the midpoint
-between the eyes. Lengths in this file are metres for an adult head; they are scaled by the distance
-between the eyes.
+between the eyes. The constants are metres for an adult head; results are Blender units, scaled by
+the distance between the eyes.
 """
 
 from __future__ import annotations
