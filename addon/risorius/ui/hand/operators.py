@@ -215,6 +215,7 @@ def proposed_range(context: Context) -> tuple[int, int]:
 
     The range of the selected keyframes, or the preview range, or else frames around the current
     one. If all keyframes are selected, the selection is ignored, because an import selects them.
+    A single selected keyframe is ignored, too.
 
     Args:
         context: context with the face and the scene.
