@@ -38,8 +38,8 @@ VERSIONS = {
     "native/python/risorius/base/version.py": r'^__version__ = "([^"]+)"',
     "addon/risorius/blender_manifest.toml": r'^version = "([^"]+)"',
 }
-# Largest size in bytes of a zip for one platform. The zip contains three wheels of 4 MB each, the
-# sample face of 8 MB, and small files.
+# Largest size in bytes of a zip for one platform. The zip contains at most three wheels of
+# 4 MB, a sample face of 8 MB, and small files.
 LARGEST = 24 << 20
 
 

@@ -129,7 +129,7 @@ def see(code):
 
 
 def state():
-    """Frame, areas, last operator and, if there is a face, its sliders, layers and modes."""
+    """Frame, areas, last operator; if there is a face, its sliders except 0, layers and modes."""
     found = rig()
     operators = bpy.context.window_manager.operators
     out = {
