@@ -8,7 +8,7 @@ A parent process starts Blender (or the bpy module of this Python), kills it whe
 names the action and the seed when it dies. Fails on an exception, also one that a handler only
 prints; on a face or a driver that is wrong; on memory or datablocks that grow with time.
 `--until K --check 1` replays a run up to an action and looks at every face after each.
-The log is build/logs/soak-SEED.log.
+The log is build/logs/soak-SEED.log, or the file that --log names.
 """
 
 import argparse

@@ -131,7 +131,10 @@ def test_back_to_live_is_exact_also_after_save_and_load(mode, dna_file, tmp_path
 
 
 def _complicate(rig):
-    """Add NLA strips, a driver, a constraint, a body, a bone and shape keys of the user."""
+    """Add a strip, a driver, a constraint, and animation of a bone and a shape key of the user.
+
+    Keys of the control armature's location are added to the strip.
+    """
     controls = scene.controls(rig)
     data = controls.animation_data
     base = data.action
@@ -197,7 +200,7 @@ def test_baked_controls_are_one_clean_action(mode, dna_file):
 
 
 def _add_layers(rig):
-    """Add a layer with an animated weight, a layer that rotates the head, and a reaction."""
+    """Add a layer with an animated weight; the layer moves two controls and turns the head."""
     controls = scene.controls(rig)
     own = controls.animation_data.action
     controls.animation_data.action = None

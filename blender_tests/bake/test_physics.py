@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulations and other readers see the face of the current frame, without side effects."""
+"""Tests that simulations and other readers see the face of the current frame, and no more."""
 
 import bpy
 import numpy as np
@@ -62,7 +62,7 @@ def test_free_cloth_falls_as_on_a_face_of_plain_actions(mode, dna_file):
     modifier = simulations.cloth(item, pinned=0.5)
     found = simulations.film(
         item, FRAMES[:5]
-    )  # it amplifies the last bits of its mesh in each frame
+    )  # free cloth amplifies the last bits of its mesh in each frame
     item.modifiers.remove(modifier)
     assert bpy.ops.risorius.bake() == {"FINISHED"}
     simulations.cloth(item, pinned=0.5)

@@ -16,7 +16,7 @@ METADATA = 300_000  # bytes of metadata that cannot be compressed
 
 
 def _picture(path, seed):
-    """Write a PNG with noise. Returns its pixels as Blender reads them."""
+    """Write a PNG with random pixels to `path`; the same `seed` gives the same pixels."""
     image = bpy.data.images.new("noise", SIDE, SIDE, alpha=False)
     noise = np.random.default_rng(seed).random((SIDE * SIDE, 4), np.float32)
     noise[:, 3] = 1.0

@@ -166,7 +166,7 @@ RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm, mm, strands per lock, locks p
 
 @pytest.fixture
 def curly(tmp_path):
-    """Returns a function that makes a face like `haired` whose metadata ask for coiled hair."""
+    """Returns a function that makes a face with cards whose metadata ask for coiled hair."""
 
     def made(words):
         dna = small_face()

@@ -213,7 +213,7 @@ def test_an_object_that_is_not_there_is_named(rig):
 
 @pytest.fixture
 def body(rig):
-    """A rotated body with base, neck and head bones at the places of the face's bones."""
+    """A body to which the face is attached: its neck and head bones start where the face's do."""
     data = bpy.data.armatures.new("body")
     body = bpy.data.objects.new("body", data)
     bpy.context.scene.collection.objects.link(body)

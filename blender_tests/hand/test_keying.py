@@ -20,7 +20,7 @@ def rig(dna_file):
 
 @pytest.fixture
 def auto():
-    """Switch auto-key on at frame 10, with factory preferences."""
+    """Switch auto-key on at frame 10; no preference limits which keys are inserted."""
     tools, edit = bpy.context.scene.tool_settings, bpy.context.preferences.edit
     names = ("use_auto_keyframe_insert_needed", "use_keyframe_insert_needed")
     names += ("use_keyframe_insert_available", "keyframe_new_interpolation_type")
@@ -72,7 +72,7 @@ def select_keys(rig, *frames):
 
 
 def _start(rig):
-    """Pose the face asymmetrically and copy the pose to Blender's clipboard and to ours."""
+    """Pose the face asymmetrically."""
     scene.set_controls(rig, mouthCornerPullL=0.8, mouthCornerPullR=0.1, jawOpen=0.5)
 
 

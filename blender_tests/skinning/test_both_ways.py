@@ -55,7 +55,7 @@ def _path(source, folder):
 
 
 def _pose(pair, random, turned):
-    """Set random sliders, and if `turned` random rotations of neck, head and eyes."""
+    """Set random sliders; if `turned`, rotate neck, head and eyes and move the eyes' control."""
     sliders = None
     for rig in pair.each():
         face, bones = scene.face(rig), scene.controls(rig).pose.bones

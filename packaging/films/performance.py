@@ -68,7 +68,12 @@ def must(result):
 
 
 def add_acting(controls, seed):
-    """Add layers with idle life and a smile, and the reaction to the flash."""
+    """Add layers with idle life and a smile, and the reaction to the flash.
+
+    Args:
+        controls: control armature of the face.
+        seed: seed of the idle life.
+    """
     choose(controls)
     must(bpy.ops.risorius.layer_add(kind="IDLE"))
     layers = controls.risorius_layers

@@ -19,12 +19,15 @@ else:
 class RunsBeside(_Base):
     """Base of operators with a background task; they define `finish`, `shown` and `cancelled_text`.
 
-    In background mode and in the redo panel, the operator waits for the result instead.
+    In scripts, in Blender's background mode and in the redo panel, the operator waits for the
+    result instead.
     """
 
     def wait_beside(self) -> None:
-        """Let the next `begin` run its task in the background. `invoke` calls this; an `execute`
-        without `invoke`, as in a script, waits for the result."""
+        """Let the next `begin` run its task beside the interface, if Blender has one.
+
+        `invoke` calls this. An `execute` without `invoke`, as in a script, waits for the result.
+        """
         self._beside = not bpy.app.background
 
     def begin(self, context: Context, task: Task) -> Result:

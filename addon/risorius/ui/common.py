@@ -88,7 +88,12 @@ def shown_progress(context: Context) -> Iterator[Callable[[float], None]]:
 
 
 def active_controls(context: Context) -> ArmatureObject | None:
-    """The control armature of the active face; None without a face or without the native module."""
+    """The control armature of the active face.
+
+    Returns:
+        None if no face is active, if the face has lost the armature, or if the native module cannot
+        be used.
+    """
     rig = None if native.problem() else parts.active_rig(context)
     return parts.controls_of(rig) if rig is not None else None
 
@@ -109,7 +114,7 @@ def face_controls(context: Context) -> ArmatureObject:
     """The control armature of the active face, for operators whose poll requires a face.
 
     Raises:
-        FaceError: no face is active.
+        FaceError: no face is active, or the active face has lost its control armature.
     """
     controls = active_controls(context)
     if controls is None:

@@ -43,7 +43,7 @@ class Timing:
     whole: bool = False
 
     def frames(self, seconds: Float) -> Float:
-        """Frames of the scene, as fractions, for seconds on the clip's clock."""
+        """Frames of the scene, with fractions, for seconds on the clip's clock."""
         return self.start + (np.asarray(seconds, np.float64) - self.origin) * self.rate
 
     def seconds(self, frames: Float) -> Float:
@@ -63,7 +63,7 @@ class Timing:
 def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
     """Convert samples at any time to keys on whole frames.
 
-    Each sample gives a key on the whole frame before it and one on the frame after it. So there are
+    A sample between two whole frames gives a key on each of them. So there are
     at most twice as many keys as samples, even if pauses between samples are long. At every whole
     frame, straight lines between keys have the values of straight lines between samples.
 
@@ -85,7 +85,11 @@ def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
 
 @dataclass
 class Curve:
-    """Keys of one F-curve: frames and values, float64[n] each; one key if all values are equal."""
+    """Keys of one F-curve: frames and values, float64[n] each; one key if all values are equal.
+
+    Attributes:
+        name: property name of the slider.
+    """
 
     name: str
     frames: Float
@@ -100,8 +104,10 @@ class Keys:
         controls: keys of the sliders, by their property names.
         turns: bone -> frames float64[n] and unit quaternions float64[n, 4], w first, in the axes of
             the control armature.
-        unknown: names of curves in the clip for which this face has no control.
-        dropped: number of samples that were not finite.
+        unknown: names of curves in the clip that are neither a control of this face nor an angle of
+            a bone.
+        dropped: number of samples that were left out because they were not finite. The angles of a
+            bone at one frame count as one sample.
     """
 
     controls: list[Curve] = field(default_factory=list)

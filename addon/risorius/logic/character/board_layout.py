@@ -27,7 +27,7 @@ _TEXT, _TITLE = 0.29, 0.46  # heights of letters in labels and titles, in board 
 _TRACK = 0.34  # width of a slider's frame
 _GAP = 0.3  # between sliders
 _MARGIN = 0.6  # around the board
-_LONGEST = 10  # letters in one line of a label
+_LONGEST = 10  # most letters in a line of several words of a label
 _WIDEST, _LINES = 14, 4  # longest word in letters, and most lines of a label
 _NARROWEST = 31.0  # smallest width of the board
 
@@ -93,7 +93,7 @@ class Board:
 
     Attributes:
         handles: its handles.
-        lines: frames and labels of the handles.
+        lines: frames and labels of the handles, and titles and outlines around them.
         border: outline of the board, for selecting the board.
         width, height: size of the outline.
     """
@@ -173,7 +173,8 @@ _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
         ),
     ),
 )
-# Name of a handle -> label; for names that are too long, or unclear without their region.
+# Stem of a handle in lower case -> label; for stems that are too long, or unclear without their
+# region.
 _LABELS = {
     "eyelashes_tweakerin": "Lashes In", "eyelashes_tweakerout": "Lashes Out", "eye": "Look",
     "eye_eyelidu": "Upper Lid", "eye_eyelidd": "Lower Lid", "ear_up": "Ear Up",
@@ -191,7 +192,7 @@ _PREFIX = re.compile(r"^CTRL_(?:([LRC])_)?")
 _LAST_SIDE = re.compile(r"[LR](?=$|Ph\d$)")
 _BESIDE = re.compile(r"(Left|Right)(?=[A-Z_]|$)")
 _DOWNWARDS = re.compile(r"(Down|Depress|Open|Blink)(?=[A-Z_]|$)")
-_CLEAR = 0.05  # smallest measured sideways motion that decides a direction
+_CLEAR = 0.05  # smallest sideways share of the measured motion that decides a direction
 _LIP = re.compile(r"[UD]$")
 
 
@@ -460,7 +461,7 @@ def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block
 
 
 def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
-    """Distribute cells evenly over the fewest rows that fit into a width."""
+    """Distribute cells evenly over as few rows as fit into a width."""
     total = sum(cell.width + _GAP for cell in cells)
     share = total / max(1.0, np.ceil(total / width))
     rows: list[list[_Cell]] = [[]]
@@ -477,7 +478,8 @@ def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
 def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
     """Make a cell for each stem of handles; tall cells are last.
 
-    Short handles of the upper and the lower lip with otherwise equal stems share a cell.
+    Short handles on a side of the face whose stems differ only in a final U or D, for the upper and
+    the lower lip, share a cell.
     """
     groups: dict[str, list[Handle]] = {}
     stems = {h.stem for h in handles}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The primary board: about 30 handles arranged like a face, each for several controls.
+"""The primary board: about 30 handles arranged like a face, most for several controls.
 
 A handle's location along each of its axes is a value from -1 to 1, and each half of an axis drives
 raw controls with weights. The result is a table of GUI controls like a file's, made from names of
@@ -19,7 +19,7 @@ from .board_letters import Point
 from .board_table import BoardTable, Row
 
 Led = Mapping[str, float]  # raw control without prefix and side -> weight
-_CLEAR = 0.05  # smallest measured sideways motion that decides a direction
+_CLEAR = 0.05  # smallest sideways share of the measured motion that decides a direction
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         """The face whose expressions the new rig gets.
 
         Raises:
-            FaceError: there is no such face.
+            FaceError: no file was chosen, or there is no such face.
         """
         if self.template == "FACE":
             rig = heads.face_there(context)

@@ -24,6 +24,9 @@ RANGES = (
 def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]:
     """The deforming armatures of all selected faces, or of the active face if none is selected.
 
+    Faces that lack their control armature or their DNA data are left out, and so are selected
+    linked faces.
+
     Args:
         context: context with the scene and the selection.
         every: True: the armatures of all faces of the scene.

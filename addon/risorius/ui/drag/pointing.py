@@ -23,12 +23,15 @@ def counts_of(live: runtime.Runtime) -> list[int]:
 
 
 def pick(context: Context, where: view.View, event: bpy.types.Event) -> picking.Hit | None:
-    """Find the point that a press would drag: the nearest handle, or the skin under the cursor.
+    """Find the point that a press would drag: a handle near the cursor, or the skin under it.
 
     Args:
         context: context with the visible scene.
         where: the view under the cursor.
         event: event with the place of the cursor.
+
+    Returns:
+        None if no face is under the cursor.
 
     Raises:
         FaceError: the face is linked, or has lost its DNA.

@@ -19,7 +19,7 @@ def _preferences(context: Context) -> Any:  # noqa: ANN401  the class lies in a 
 
 
 def favourites_of(context: Context) -> list[str]:
-    """The favourites of the active face."""
+    """The favourites of the active face, or the user's if the face has no list of its own."""
     users = getattr(_preferences(context), "favourites", "")
     return favourites.of(face_controls(context), users)
 

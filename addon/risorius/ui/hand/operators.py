@@ -20,7 +20,7 @@ from ..words import of_error, say
 from .base import HandOperator
 from .favourites import favourites_of
 
-_REACH = 0.3  # share of the window's width that changes the factor from 0 to 1
+_REACH = 0.3  # share of the window's width that brings the factor from its start value to 1
 _AROUND = 12  # frames before and after the current one
 _NONE = 0.5  # factor of a breakdown in the middle
 
@@ -215,6 +215,7 @@ def proposed_range(context: Context) -> tuple[int, int]:
 
     The range of the selected keyframes, or the preview range, or else frames around the current
     one. If all keyframes are selected, the selection is ignored, because an import selects them.
+    A single selected keyframe is ignored, too.
 
     Args:
         context: context with the face and the scene.

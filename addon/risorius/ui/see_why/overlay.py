@@ -132,7 +132,7 @@ def _draw_ramp(pen: _Pen, text: str, shown: heat.Heat, x: float, y: float) -> fl
 
 
 def look_in_words(context: Context, look: look_masks.Look) -> str:
-    """A sentence about the solo and mute state of a face.
+    """A sentence about the solo and mute state of a face; "" for neither.
 
     Args:
         context: context with the preferences.

@@ -131,11 +131,14 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
 
 
 def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int, int] | None:
-    """The armature of the face, its mesh and the vertex under the cursor; None without a face.
+    """The face under the cursor: armature, index of the mesh in the DNA file, index of the vertex.
 
     Args:
         context: context of Blender.
         event: event with the place of the cursor in the window.
+
+    Returns:
+        None if there is no face under the cursor.
     """
     area = context.area
     if area is None:

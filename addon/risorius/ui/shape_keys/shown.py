@@ -102,7 +102,8 @@ def value_of(row: assigned.Row) -> assigned.Said:
 def sample_of(row: assigned.Row) -> str:
     """The value of the assigned.Choice that a shape key is assigned to; "" for none.
 
-    The panel shows the picture of the sample man for this value.
+    For several controls that are no unit of ARKit, it is the first control. The panel shows the
+    picture of the sample man for this value.
 
     Args:
         row: row of the shape key, from assigned.of.

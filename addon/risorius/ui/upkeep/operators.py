@@ -30,7 +30,10 @@ SHAPES = (
 
 
 def override_trouble(rig: ArmatureObject | None) -> str:
-    """The reason why a face with a library override does not move; "" for other faces."""
+    """The reason why a face with a library override does not move.
+
+    "" if the face moves, has no override, or is None.
+    """
     if rig is None or not rig.override_library:
         return ""
     return library_overrides.trouble(rig)
