@@ -56,7 +56,8 @@ def skin_samples(places: Floats, faces: Sequence[Sequence[int]]) -> Skin:
 
     Args:
         places: [V, 3], neutral.
-        faces: vertex indices of each face, three or more.
+        faces: vertex indices of each face, three or more. The middle of a face is the mean of its
+            first four vertices.
     """
     normals = np.zeros_like(places)
     rows: list[tuple[int, int, int, int]] = []
@@ -178,7 +179,7 @@ def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
 
 
 class Cards:
-    """Vertices of hair, each assigned to the nearest skin triangle in the neutral pose."""
+    """Vertices of hair, each assigned to a triangle at the nearest vertex of the neutral skin."""
 
     # The nearest triangle in another pose is searched among the triangles that are near a hair in
     # the neutral pose: among the NEAR nearest, and in deep folds among the AROUND nearest.

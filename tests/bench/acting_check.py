@@ -132,7 +132,10 @@ class Mouth:
 
 
 class Hair:
-    """Checks hair cards over the skin: either their roots, or their other vertices."""
+    """Checks hair cards over the skin: either their roots, or their other vertices.
+
+    At most `most` vertices, spread evenly over the mesh `name`, are checked.
+    """
 
     def __init__(self, face: Face, name: str, roots: bool, most: int = 4000) -> None:
         mesh = face.mesh(name)
@@ -199,7 +202,10 @@ class Face:
         return next(m for n, m in self._meshes.items() if n.startswith(name))
 
     def corneas(self, side: float) -> list[Floats]:
-        """The vertices of the cornea on a side, if the cornea is a separate mesh."""
+        """Vertices of each mesh named cornea on one side; empty if the face has no such mesh.
+
+        side: a number with the sign of x on the side.
+        """
         found = [self.rest[m] for n, m in self._meshes.items() if n.startswith("cornea")]
         return [places[places[:, 0] * side > 0] for places in found]
 
