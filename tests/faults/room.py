@@ -78,7 +78,7 @@ def voice(path: Path) -> Path:
 
 
 def jobs(folder: Path) -> Path:
-    """Write a jobs.toml of four jobs with the take; outputs are in folder / "out"."""
+    """Write a jobs.toml of two jobs, LOD 0 and 1 of the take; outputs are in folder / "out"."""
     path = folder / "jobs.toml"
     path.write_text(
         'output = "out"\n[[jobs]]\nclips = "*.csv"\n'

@@ -58,7 +58,7 @@ def range_of(layer, clip):
 
 
 def moment(layer, clip, time):
-    """The scene time at which a layer is evaluated, extended or not; None if it has no effect."""
+    """The time in a layer's range that it shows at a scene time, in s; None: it has no effect."""
     start, end = range_of(layer, clip)
     if start <= time <= end:
         return time

@@ -39,7 +39,7 @@ from risorius.cli import main
 from risorius.cli.faces import author
 from risorius.controls import arkit
 
-# The module computes skinning and morphing from the format's description, without risorius.author.
+# oracle.py of the Blender tests computes skinning and morphing without risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)
