@@ -392,7 +392,13 @@ def test_a_folder_of_obj_files_is_a_head(tmp_path):
 
 
 def fbx_head(path, picture, *, embedded):
-    """Write a head, and eyes with two materials, as an FBX in centimetres."""
+    """Write a head, and eyes with two materials, as an FBX in centimetres.
+
+    Args:
+        path: path of the FBX.
+        picture: bytes of a PNG, the colour texture of the skin.
+        embedded: True: the FBX contains the PNG; False: it only names skin.png.
+    """
     points, faces, shapes = likenesses.skull()
     eyes = likenesses.joined(*likenesses.eyes())
     objects, links = [], []
