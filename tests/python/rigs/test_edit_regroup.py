@@ -339,7 +339,17 @@ def test_products_of_quaternions_stay_in_their_order(case):
 
 
 def face_of_regions(seed, regions=6, joints=12, controls=20):
-    """A face with one group: dense regions of joints, in random order, and small other values."""
+    """A face with one group: dense regions of joints, in random order, and small other values.
+
+    Args:
+        seed: seed of all random values.
+        regions: number of regions.
+        joints: number of joints per region.
+        controls: number of controls that move the joints of a region, of 60 in all.
+
+    Returns:
+        (the face, float32[rows, 60]: its values without the small ones, region of each joint).
+    """
     rng = np.random.default_rng(seed)
     count = regions * joints
     owner = rng.permutation(np.repeat(np.arange(regions), joints))
