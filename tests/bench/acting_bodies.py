@@ -83,7 +83,11 @@ class Ball:
     ROWS, COLUMNS = 90, 180
 
     def __init__(self, places: Floats) -> None:
-        """Make the table. Args: places  [V, 3] neutral vertices; inner layers have no effect."""
+        """Make the table.
+
+        Args:
+            places: [V, 3], neutral vertices; inner layers have no effect.
+        """
         low, high = places.min(axis=0), places.max(axis=0)
         around = places - (low + high) / 2
         ones = np.column_stack([2 * around, np.ones(len(around))])

@@ -157,7 +157,14 @@ def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longe
 def _signalled(
     group: str, what: signal.Signals, rounds: int, names: Sequence[str]
 ) -> Iterator[Row]:
-    """Send a signal at random moments; the output file must then be the complete old or new one."""
+    """Send a signal at random moments; the output file must then be the complete old or new one.
+
+    Args:
+        group: name of the group of rows.
+        what: the signal.
+        rounds: runs of each command.
+        names: keys of COMMANDS; empty: all.
+    """
     draw = random.Random(20)
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:

@@ -45,7 +45,13 @@ class Done:
 
 @dataclass
 class Row:
-    """The results of a trial: number of runs, and a sentence for each failure."""
+    """The results of a trial.
+
+    Attributes:
+        runs: number of runs.
+        faults: a sentence for each failure.
+        not_run: why the trial did not run; "" if it ran.
+    """
 
     group: str
     name: str

@@ -95,7 +95,12 @@ def _is_constant(value: ast.expr, frozen: set[str]) -> bool:
 
 
 class _File(NamedTuple):
-    """A parsed file. Attributes: body  its statements; nodes  type -> its nodes of the type."""
+    """A parsed file.
+
+    Attributes:
+        body: the statements of the module.
+        nodes: type of syntax node -> all nodes of the type in the file.
+    """
 
     body: list[ast.stmt]
     nodes: dict[type, list[Any]]

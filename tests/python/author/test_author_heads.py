@@ -39,7 +39,11 @@ def made(name):
 
 
 def read(path, text=""):
-    """Read a head's file, or a spec of it. Args: text  lines for the spec's table [source]."""
+    """Read a head's file, or a spec of it.
+
+    Args:
+        text: lines for the spec's table [source]; "": read the file without a spec.
+    """
     if text:
         toml = path.with_suffix(".toml")
         toml.write_text(f'[source]\nneutral = "{path.name}"\n{text}', encoding="utf-8")

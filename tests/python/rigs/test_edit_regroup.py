@@ -299,7 +299,8 @@ def test_quaternions_come_out_of_one_group_whole(name):
 def turning_face(*groups):
     """A face with two quaternion joints and two LODs.
 
-    Args: groups  joint groups: (rows of each LOD, control indices, output indices, values).
+    Args:
+        groups: joint groups: (rows of each LOD, control indices, output indices, values).
     """
     dna = risorius.Dna()
     dna.lod_count = 2
@@ -701,8 +702,8 @@ def test_a_full_scale_face():
 def _face_of(values):
     """A face with one joint group.
 
-    Args: values: float[joints, controls], effect of each control on the x translation of each
-    joint.
+    Args:
+        values: float[joints, controls], effect of each control on the x translation of each joint.
     """
     joints, controls = values.shape
     dna = risorius.Dna()

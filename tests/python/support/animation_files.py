@@ -47,8 +47,9 @@ def camel(name: str) -> str:
 
 
 def timecode(seconds: float, base: int) -> str:
-    """Seconds since midnight as HH:MM:SS:FF.sss: FF counts frames of 1 / base s, sss thousandths of
-    one.
+    """Seconds since midnight as HH:MM:SS:FF.sss.
+
+    FF counts frames of 1 / base s, sss thousandths of a frame.
     """
     units = round((seconds % 86400.0) * base * 1000)
     frames, rest = divmod(units, 1000)

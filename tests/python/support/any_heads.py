@@ -137,7 +137,12 @@ def generator():
 
 
 def random_person(seed: int, source):
-    """A person with random gender, age, build, origin and facial features."""
+    """A person with random gender, age, build, origin and facial features.
+
+    Args:
+        seed: the same seed gives the same person.
+        source: a risorius_people Source, whose target files are the possible features.
+    """
     from risorius_people.people import MAN
     from risorius_people.source import TARGETS
 

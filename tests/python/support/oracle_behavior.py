@@ -15,7 +15,7 @@ SEQUENCES = ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"]
 
 
 def multiply(a, b):
-    """The products of quaternions, float64[..., 4]."""
+    """The products of quaternions a b, float64[..., 4] in the order x, y, z, w."""
     # The formula is written out, because np.cross of three numbers takes fifty times as long.
     # Single quaternions are converted to Python floats, because NumPy scalars take ten times as
     # long.
