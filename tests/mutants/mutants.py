@@ -121,7 +121,11 @@ class Copy:
         self._fresh = False  # whether the Python module is built from the present sources
 
     def refresh(self) -> None:
-        """Copy changed files and build. Unchanged copies keep their times, so Ninja skips them."""
+        """Copy changed files, and build the copy or, for package and scene, take the wheel's
+        module.
+
+        Unchanged copies keep their times, so Ninja skips them.
+        """
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
             cwd=PROJECT, check=True, capture_output=True, text=True,
@@ -187,7 +191,10 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the failed test passes without the mutant; if not, its failure proves nothing."""
+        """Whether the failed test passes without the mutant; if not, its failure proves nothing.
+
+        A test that has passed before is not run again.
+        """
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)

@@ -11,7 +11,7 @@ import pytest
 
 PROJECT = Path(__file__).resolve().parents[2]
 GOLDEN = PROJECT / "tests" / "data" / "golden"
-# Folder with golden data. The variable can name a folder with other files of the same kind.
+# Folder with golden data. RISORIUS_GOLDEN can name a folder with other files of the same kind.
 GOLDEN_SET = Path(os.environ.get("RISORIUS_GOLDEN", GOLDEN))
 SHARED = Path(os.environ.get("RISORIUS_SHARED", PROJECT.parent / "shared"))
 
@@ -41,7 +41,10 @@ def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object
 
 
 def lods_of(about: dict) -> list[int] | None:
-    """The LODs of the DNA file that a filtered load kept; None if the load was not filtered."""
+    """The LODs of the DNA file that a filtered load kept; None if the load was not filtered.
+
+    about: content of an evaluation's JSON.
+    """
     load, count = about["load"], about["counts"]["lods"]
     if load["lods"]:
         return load["lods"]

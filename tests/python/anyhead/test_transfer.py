@@ -40,11 +40,13 @@ def template():
 
 
 def on(template, points, target=None, **options):
-    """Transfer the template's expressions to a head.
+    """Transfer the template's expressions to a head, and return its displacements by pose.
 
     Args:
+        template: the TemplateFace to transfer from.
         points: positions of the template's vertices on the head.
         target: surface of the head; None: the template's triangles with these points.
+        options: fields of TransferOptions.
     """
     target = target or Surface(points, template.surface.triangles)
     return transfer(

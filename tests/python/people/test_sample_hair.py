@@ -190,8 +190,7 @@ def stage():
     """A face with one flat mesh, which is 2 decimetres wide.
 
     The control `rise` raises the mesh by 0.1 decimetres from x = 0.2 on, with a slope from x =
-    0.15;
-    the control `idle` moves nothing.
+    0.15. The control `idle` moves nothing.
     """
     side = np.arange(41)
     x, z = np.meshgrid(0.05 * side - 1, 0.05 * side - 1, indexing="ij")

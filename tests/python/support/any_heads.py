@@ -87,7 +87,12 @@ def sphere(rows: int, columns: int, turn: float = 0.0) -> tuple[np.ndarray, np.n
 
 
 def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.ndarray]:
-    """Template, target, and the template's vertices at their true places on the target, [V, 3]."""
+    """Template, target, and the template's vertices at their true places on the target, [V, 3].
+
+    Args:
+        seed: seed of the target's proportions and bumps; 0: the same form as the template.
+        size: half the height of the target; half the height of the template is always 12.
+    """
     directions, triangles = sphere(30, 44)
     others, corners = sphere(47, 61, turn=0.9)
     template = Surface(form(directions), triangles)
@@ -111,7 +116,13 @@ def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 
 
 
 def errors(template: Surface, found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """float64[V]: distances from the true places in tangent planes, in the surface's unit."""
+    """Tangential error of each vertex, float64[V]: the part of `found - true` along the surface.
+
+    Args:
+        template: head with the triangles of both arrays.
+        found: float64[V, 3], positions to judge.
+        true: float64[V, 3], correct positions; their surface gives the tangent planes.
+    """
     normals = Surface(true, template.triangles).normals()
     away = found - true
     return np.linalg.norm(away - (away * normals).sum(1, keepdims=True) * normals, axis=1)
@@ -126,7 +137,12 @@ def generator():
 
 
 def random_person(seed: int, source):
-    """A person with random gender, age, build, origin and facial features."""
+    """A person with random gender, age, build, origin and facial features.
+
+    Args:
+        seed: the same seed gives the same person.
+        source: a risorius_people Source, whose target files are the possible features.
+    """
     from risorius_people.people import MAN
     from risorius_people.source import TARGETS
 

@@ -335,8 +335,7 @@ def by_name(view, unmapped=None):
         view: result of decoded(), or a decoded golden file.
         unmapped: Names of the unfiltered file, for indices that the reference's LOD filter does not
             change: outputs of channels and animated maps, channels of targets, networks. None: use
-                the
-            names of `view`.
+            the names of `view`.
     """
     own = Names(view)
     old = unmapped or own

@@ -38,7 +38,9 @@ class GlbFile:
         return self.binary[begin : begin + view["byteLength"]]
 
     def numbers(self, number):
-        """Values of an accessor, float64[n, k]; asserts that they have the stated min and max."""
+        """Values of an accessor, float64[n, k]; checked against min and max if the file states
+        them.
+        """
         about = self.json["accessors"][number]
         kind, width = np.dtype(_KINDS[about["componentType"]]), _WIDTHS[about["type"]]
         out = np.zeros((about["count"], width), kind)

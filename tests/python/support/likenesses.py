@@ -60,7 +60,10 @@ def joined(*pieces):
 
 
 def skull(lopsided=False):
-    """(positions, triangles, shapes): the face of face_shapes, with a nose and a closed skull."""
+    """(positions, triangles, shapes): the face of face_shapes, with a nose and a closed skull.
+
+    lopsided: True: a bump on the left side makes the head asymmetric.
+    """
     points, quads = face_shapes.head()
     moved = face_shapes.expressions(points)
     nose = face_shapes.bump(points, 0, -1, 2.0)[:, None] * [0, 0, 2.5]

@@ -14,7 +14,14 @@ FACTORS = 16  # larger than the number of factors of any corrective in the tests
 
 
 def table(conditionals, rows, values, output_count):
-    """Outputs [O] of a conditional table, and bounds [O] of their float32 errors."""
+    """Outputs [O] of a conditional table, and bounds [O] of their float32 errors.
+
+    Args:
+        conditionals: the Conditionals of a Dna.
+        rows: number of rows from the beginning of the table that are evaluated.
+        values: values of all inputs.
+        output_count: number O of outputs.
+    """
     out = np.zeros(output_count)
     size = np.zeros(output_count)
     columns = [
@@ -38,7 +45,15 @@ def table(conditionals, rows, values, output_count):
 
 
 def correctives(dna, controls, used, settle):
-    """Calculate in place the correctives whose index is in `used`."""
+    """Calculate in place the correctives whose index is in `used`.
+
+    Args:
+        dna: the Dna.
+        controls: float64 vector of all controls; its correctives are set.
+        used: indices of the controls that something reads.
+        settle: True: repeat until no corrective changes; False: correctives read the previous
+            values of other correctives.
+    """
     rows, columns, values = (
         np.asarray(a) for a in (dna.psds.rows, dna.psds.columns, dna.psds.values)
     )
@@ -166,7 +181,7 @@ def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
 
 
 def evaluate(dna, raw, lod, *, settle, controls=None, control_count=None):
-    """Evaluate in float64. Returns (values, bounds) of joints, shapes, maps and controls.
+    """Evaluate in float64. Returns (values, bounds) of each: joints, shapes, maps and controls.
 
     Args:
         dna: the Dna.
@@ -174,7 +189,7 @@ def evaluate(dna, raw, lod, *, settle, controls=None, control_count=None):
         lod: the LOD.
         settle: repeat the correctives until they no longer change.
         controls: vector of the previous evaluation, for one-frame latency; changed in place.
-        control_count: number of all controls; None: as many as the file has.
+        control_count: number of all controls; None: the file's raw controls and correctives.
     """
     count = control_count or len(dna.raw_control_names) + dna.psd_count
     if controls is None:
