@@ -81,7 +81,8 @@ class NewFile {
 std::filesystem::path linked_file(const std::filesystem::path& path);
 
 /// Makes a hidden folder in the folder of `target`, named as in NewFile::beside, for several files
-/// that are not in their final places yet. Fails: as NewFile::beside, with an empty path.
+/// that are not in their final places yet. Out: the folder's path; empty if the call fails.
+/// Fails: as NewFile::beside.
 std::filesystem::path make_hidden_folder(const std::filesystem::path& target,
                                          std::error_code& error);
 

@@ -162,8 +162,8 @@ RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which
     for (std::size_t j = i; j < end; ++j) {
       const std::size_t at = which[j] * stride;
       const bool moves = turns(rotations + at);
-      // The w of a collected rotation is written later, so that this store goes to an unused
-      // number.
+      // If the rotation is not 0, turn_together writes its w later. The store below then goes to
+      // `elsewhere`, which nothing reads.
       float* w = moves ? &elsewhere : rotations + at + 3;
       *w = 1.0f;
       turning[count] = static_cast<std::uint32_t>(at);

@@ -322,9 +322,13 @@ std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
   return {&simd::scalar_kernels(), others[choice % others.size()]};
 }
 
-// Compares the poses of scalar kernels `a` with the poses of `b`. SSE4 must give the same bits.
-// Other sets are compared only if the controls are equal, because a control that differs in its
-// last bits may select another row of a table. In: tame  false: only the bits of SSE4 are compared
+// Compares the poses of the scalar kernels, `a`, with those of another instruction set, `b`. SSE4
+// must give the same bits. For other sets the joints are compared with a tolerance, and only if the
+// controls are equal and small, because a control that differs in its last bits may select another
+// row of a table.
+// In:  tame  whether the numbers of face and input are moderate; false: only the bits of SSE4 are
+//            compared
+// Out: kKept, or the broken promise
 std::string compare(const Dna& dna, const Evaluated& a, const Evaluated& b, bool tame) {
   const float tolerance = joint_tolerance(dna, a.rig);
   const bool exact = std::string_view(b.rig.kernels->name) == "sse4";

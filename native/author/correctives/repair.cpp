@@ -73,7 +73,7 @@ struct Work {
   }
 };
 
-/// The result of one check: contacts, faults and their sums.
+/// The result of one check: contacts, faults, and the sums of the faults beyond the allowed ones.
 struct Look {
   std::vector<Contact> contacts;
   SkinFaults faults;

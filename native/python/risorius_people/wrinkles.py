@@ -175,14 +175,14 @@ def vertex_folds(
     part: Part, uvs: Floats, positions: Floats, units: Mapping[str, Expression]
 ) -> dict[str, Floats]:
     """Name of a mask -> float64[V, 4]: compression at each vertex (0 to 1), and the direction of
-    the folds as a tensor xx, xy, yy, multiplied by the compression.
+    the folds in the texture as a tensor xx, xy, yy, multiplied by the compression.
 
-    The folds of a mask come from the first of its controls at 1.
+    If several controls drive a mask, its folds are those of the first control, set to 1.
 
     Args:
-        part: the head mesh.
-        uvs: float64[T, 2] in [0, 1].
-        positions: float64[v, 3] of its vertices, in decimetres.
+        part: the head mesh, with V vertices.
+        uvs: float64[T, 2] in [0, 1], texture coordinates.
+        positions: float64[V, 3], neutral positions of the vertices in decimetres.
         units: raw control -> expression.
     """
     surface = Surface(part.polygons, uvs, positions)

@@ -116,7 +116,7 @@ def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 
 
 
 def errors(template: Surface, found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Tangential error of each vertex, float64[V]: the part of `found - true` along the surface.
+    """float64[V]: for each vertex, the length of the part of `found - true` along the surface.
 
     Args:
         template: head with the triangles of both arrays.

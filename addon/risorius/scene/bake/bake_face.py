@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes the animation of a face to actions, and restores the unbaked face.
 
-Only actions move a baked face. The evaluator skips it, so that no property is driven twice and the
-face looks the same in a Blender without the add-on. Armatures and shape keys store their earlier
-animation, which is restored when the bake is removed.
+There are two kinds of bakes. RESULT: only actions move the face. The evaluator skips it, so that no
+property is driven twice and the face looks the same in a Blender without the add-on. CONTROLS: one
+action moves the controls in place of their layers, NLA and drivers, and the evaluator still moves
+the face. Armatures and shape keys store their earlier animation, which is restored when the bake is
+removed.
 """
 
 from __future__ import annotations

@@ -19,9 +19,11 @@ _NEUTRAL = ("neutral", "basis", "base", "rest", "default", "head", "face")
 def find_neutral(folder: Path) -> Path:
     """Find the file of the neutral mesh in a folder by its name.
 
+    The words neutral, basis, base, rest, default, head and face are tried in this order. A word
+    finds the file with this name, or else the only file with the word in its name.
+
     Raises:
-        ShapeFileError: no file is named neutral, basis, base, rest, default, head or face, and each
-            of these words is part of no file name or of several.
+        ShapeFileError: no word finds a file.
     """
     files = {path.stem.lower(): path for path in sorted(folder.glob("*.obj"))}
     for word in _NEUTRAL:

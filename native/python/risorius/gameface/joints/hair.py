@@ -257,7 +257,8 @@ def _woven(
     dense = np.zeros((len(vertices), max(INFLUENCES, chain[-1] + 1)))
     pulled = np.zeros_like(dense)
     for number, weight in ((upper, (1 - part) * share), (lower, part * share)):
-        # Number -1 means hair above the first joint, which keeps the weights of the head.
+        # Above the middle between the first two joints there is no upper joint (number -1): the
+        # upper part of the weight stays with the head, and the first joint gets the lower part.
         np.add.at(pulled, (every, np.array(chain)[number]), np.where(number < 0, 0.0, weight))
     for k in range(hair.joints.shape[1]):
         np.add.at(dense, (every, hair.joints[vertices, k]), hair.weights[vertices, k])
