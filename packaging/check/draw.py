@@ -6,8 +6,9 @@
 A comment is a docstring or a block of comment lines of C++ or Python. A sentence comes from a
 Markdown page, an interface text or an error message. Each item shows the place in the project and
 the text as its readers see it: a comment with its signature, the docstring of its file, and the
-class or function around it with the first sentence of its docstring; a sentence with its paragraph.
-The code itself is not shown.
+class or function around it with the first sentence of its docstring; a sentence with its paragraph;
+an interface text with the labels around it; an error message with the function that raises it.
+{...} stands for a value that a user sees. The code itself is not shown.
 """
 
 import ast
@@ -18,6 +19,8 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+
+import interface_uses
 
 PROJECT = Path(__file__).resolve().parents[2]
 COUNT = 100
@@ -125,18 +128,36 @@ def page_sentences(path: Path) -> Iterator[Item]:
 
 
 def interface_sentences() -> Iterator[Item]:
-    """Tooltips and labels, which the German table lists, and error messages of the packages."""
+    """Labels, tooltips and messages of the extension, which the German table lists."""
     table = PROJECT / "addon/risorius/language/interface_de.toml"
-    for texts in tomllib.loads(table.read_text(encoding="utf-8")).values():
-        for text in texts:
-            if len(text.split()) > 3:
-                yield "interface", "", "label, tooltip or report in Blender", text
+    listed = tomllib.loads(table.read_text(encoding="utf-8")).values()
+    texts = {text for some in listed for text in some if len(text.split()) > 3}
+    uses = interface_uses.uses_in(files("addon/*.py"), texts)
+    for path in files("native/python/*.toml"):
+        source = path.read_text(encoding="utf-8")
+        about = one_line(source.partition("\n\n")[0].replace("#", "").partition("MIT\n")[2])
+        for text in texts - uses.keys():
+            if f'"{text}"' in source:
+                uses[text] = [("label", about)]
+    for text in texts:
+        kinds = " / ".join(dict.fromkeys(kind for kind, _ in uses.get(text, [])))
+        contexts = " // ".join(dict.fromkeys(names for _, names in uses.get(text, [])[:3]))
+        yield "interface", contexts, kinds or "label in Blender", text
+
+
+def error_messages() -> Iterator[Item]:
+    """Messages of raise statements, with the functions and classes around them."""
     for path in files("addon/*.py", "native/python/*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        source = path.read_text(encoding="utf-8")
+        lines, tree = source.splitlines(), ast.parse(source)
+        about = one_line(ast.get_docstring(tree) or "")
+        nodes = [node for node in ast.walk(tree) if isinstance(node, _DESCRIBED)]
+        for node in ast.walk(tree):
             if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
                 text = _literal(node.exc.args[-1])
                 if len(text.split()) > 3:
-                    yield f"{place_of(path)}:{node.lineno}", "", "error message", text
+                    context = f"raised by: {about}{around(nodes, node.lineno, lines)}"
+                    yield f"{place_of(path)}:{node.lineno}", context, "error message", text
 
 
 def _literal(node: ast.expr) -> str:
@@ -176,8 +197,9 @@ def main() -> int:
     comments = [item for path in files("*.py") for item in python_comments(path)]
     comments += [item for path in files("*.h", "*.cpp") for item in cpp_comments(path)]
     sentences = [item for path in files("*.md") for item in page_sentences(path)]
+    sentences += [*interface_sentences(), *error_messages()]
     write(out / "comments.md", comments, chosen)
-    write(out / "sentences.md", sentences + list(interface_sentences()), chosen)
+    write(out / "sentences.md", sentences, chosen)
     return 0
 
 
