@@ -137,7 +137,7 @@ def interface_sentences() -> Iterator[Item]:
         source = path.read_text(encoding="utf-8")
         about = one_line(source.partition("\n\n")[0].replace("#", "").partition("MIT\n")[2])
         for text in texts - uses.keys():
-            if f'"{text}"' in source:
+            if f'"{text}"' in source or f'"{text.replace("right", "left")}"' in source:
                 uses[text] = [("label", about)]
     for text in texts:
         kinds = " / ".join(dict.fromkeys(kind for kind, _ in uses.get(text, [])))
@@ -154,10 +154,32 @@ def error_messages() -> Iterator[Item]:
         nodes = [node for node in ast.walk(tree) if isinstance(node, _DESCRIBED)]
         for node in ast.walk(tree):
             if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
-                text = _literal(node.exc.args[-1])
-                if len(text.split()) > 3:
+                text = _message(node.exc)
+                if text:
                     context = f"raised by: {about}{around(nodes, node.lineno, lines)}"
                     yield f"{place_of(path)}:{node.lineno}", context, "error message", text
+
+
+def _message(call: ast.Call) -> str:
+    """The message of an error, after its place; "" if the text comes from another function.
+
+    Args:
+        call: the error, or a call such as `document.fail(place, message)` that makes it.
+    """
+    texts = [_literal(arg) for arg in call.args]
+    found = next((at for at in (-1, 0) if len(texts[at].split()) > 3), None)
+    if found is None:
+        return ""
+    text = texts.pop(found)
+    rest = [arg for arg in call.args if arg is not call.args[found]]
+    places = [said or f"{{{ast.unparse(arg)}}}" for said, arg in zip(texts, rest, strict=True)]
+    name = ast.unparse(call.func)
+    if name.endswith(("fail", "error")):
+        places.insert(0, "{file}")
+    elif name == "GivenError":
+        places.insert(0, "{file and field}")
+    places += [f"{k.arg} {{{k.arg}}}" for k in call.keywords if k.arg in ("line", "column")]
+    return ": ".join([*places, text])
 
 
 def _literal(node: ast.expr) -> str:

@@ -82,7 +82,7 @@ def _kind(source: Source, node: ast.Constant) -> str:
     for outer in source.around(node):
         if isinstance(outer, ast.keyword) and outer.arg in _LABELS | {"description"}:
             return _kind_of_argument(source, outer)
-        if isinstance(outer, ast.Tuple) and inner in outer.elts[1:3] and len(outer.elts) > 2:
+        if isinstance(outer, ast.Tuple) and inner in outer.elts[1:3] and _is_choice(outer):
             if inner is outer.elts[2]:
                 return f"tooltip of the choice {_shown(outer.elts[1])}"
             return "label of a choice"
@@ -96,6 +96,15 @@ def _kind(source: Source, node: ast.Constant) -> str:
         if isinstance(outer, ast.Call) and not ast.unparse(outer.func).endswith("mark"):
             break
     return _kind_by_function(source, node)
+
+
+def _is_choice(item: ast.Tuple) -> bool:
+    """Whether a tuple is (identifier, label, description) of a Blender enumeration."""
+    first = item.elts[0]
+    is_word = isinstance(first, ast.Name) or (
+        isinstance(first, ast.Constant) and " " not in str(first.value)
+    )
+    return is_word and len(item.elts) > 2
 
 
 def _kind_of_argument(source: Source, argument: ast.keyword) -> str:
