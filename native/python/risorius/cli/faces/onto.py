@@ -107,7 +107,9 @@ def check_arguments(args: argparse.Namespace) -> None:
             )
         return
     if args.names is not None:
-        raise CommandLineError("author: --names is of a head with expressions, and not of --onto")
+        raise CommandLineError(
+            "author: --names needs a head with expressions and is not possible with --onto"
+        )
     if args.out is None:
         raise CommandLineError("author: -o OUT.dna was expected")
     if args.spec is not None and args.spec.suffix.lower() not in (".dna", ".json"):
