@@ -6,9 +6,10 @@
 A comment is a docstring or a block of comment lines of C++ or Python. A sentence comes from a
 Markdown page, an interface text or an error message. Each item shows the place in the project and
 the text as its readers see it: a comment with its signature, the docstring of its file, and the
-class or function around it with the first sentence of its docstring; a sentence with its paragraph;
-an interface text with the labels around it; an error message with the function that raises it.
-{...} stands for a value that a user sees. The code itself is not shown.
+class or function around it with the first sentence of its docstring; a sentence of a page with its
+paragraph and headings, in a list also with the sentence before the list; an interface text with the
+labels around it; an error message after its place, with the function that raises it. {...} stands
+for a value that a user sees. The code itself is not shown.
 """
 
 import ast
@@ -116,15 +117,21 @@ def blocks(path: Path, lines: list[str], about: str, mark: str) -> Iterator[Item
 def page_sentences(path: Path) -> Iterator[Item]:
     """Sentences of a Markdown page without its code blocks, tables and headings."""
     text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.S)
-    heading = path.stem
-    for paragraph in re.split(r"\n\s*\n|\n(?=\s*[-*\d]+\.? )", text):
-        if paragraph.lstrip().startswith("#"):
-            heading = paragraph.strip().splitlines()[0].lstrip("# ")
-        elif "|" not in paragraph:
-            whole = one_line(paragraph)
+    headings: list[str] = []
+    lead = ""
+    paragraphs = re.split(r"\n\s*\n|\n(?=\s*[-*\d]+\.? )", text)
+    for paragraph, after in zip(paragraphs, [*paragraphs[1:], ""], strict=True):
+        whole, is_item = one_line(paragraph), re.match(r"\s*(?:[-*]|\d+\.) ", paragraph)
+        if whole.startswith("#"):
+            headings, lead = [*headings[:1], whole.lstrip("# ")], ""
+        elif "|" not in paragraph and (is_item or not paragraph.startswith("    ")):
+            lead = lead if is_item else whole
+            context = f"{lead} {whole}" if is_item and lead.endswith(":") else whole
+            if whole.endswith(":"):
+                context += f" {one_line(after)[:300]}"
             for sentence in re.split(r"(?<=[.!?])\s+(?=[A-Z*`\[])", whole):
                 if len(sentence.split()) > 3 and not sentence.startswith("!["):
-                    yield place_of(path), whole, heading, sentence
+                    yield place_of(path), context, " > ".join(headings) or path.stem, sentence
 
 
 def interface_sentences() -> Iterator[Item]:

@@ -127,7 +127,7 @@ def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
         )
     except OSError as error:
         raise RecogniserError(
-            f"the recogniser's process could not be started: {python}: {error.strerror}"
+            f"the process of the speech recogniser could not be started: {python}: {error.strerror}"
         ) from error
 
 

@@ -103,7 +103,8 @@ def check_arguments(args: argparse.Namespace) -> None:
         given = [name for name in _OWN if getattr(args, name) is not None]
         if given:
             raise CommandLineError(
-                f"author: --{given[0].replace('_', '-')} is of --onto HEAD, which is missing"
+                f"author: --{given[0].replace('_', '-')} is of --onto HEAD, which is missing: "
+                "the option works only with it"
             )
         return
     if args.names is not None:
