@@ -283,8 +283,8 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
     change.report.append(
         told(
             (
-                "The mesh {label} is not in the DNA file; it stays in the scene, hidden, because "
-                "of {things}."
+                "The mesh {label} is not in the DNA file; in the scene this mesh stays, hidden, "
+                "for {things}."
             ),
             label=label,
             things=", ".join(things),

@@ -150,13 +150,13 @@ def _report_entries(change: Change, entries: drivers.Entries) -> None:
         (
             parts.CHANNELS,
             "The blend shape {label} is gone.",
-            "The blend shape {label} is gone: drivers that read it get 0.",
+            "The blend shape {label} is gone: what it drove reads 0 now.",
             "New blend shapes: {added}.",
         ),
         (
             parts.MAPS,
             "The animated map {label} is gone.",
-            "The animated map {label} is gone: drivers that read it get 0.",
+            "The animated map {label} is gone: what it drove reads 0 now.",
             "New animated maps: {added}.",
         ),
     ):

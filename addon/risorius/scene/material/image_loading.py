@@ -83,7 +83,7 @@ def _room_for(path: Path) -> int:
         raise ValueError(
             told(
                 (
-                    "The texture {file} of {width:,} x {height:,} pixels was not loaded: it needs "
+                    "The texture {file} of {width:,} x {height:,} pixels stays away: it needs "
                     "{room:,} bytes, at most {limit:,} are allowed for a file of its size."
                 ),
                 file=path.name,
@@ -174,8 +174,8 @@ class Images:
             raise ValueError(
                 told(
                     (
-                        "The texture {file} was not loaded: together with the textures before it, "
-                        "it needs {room:,} bytes, at most {limit:,} are allowed for files of their "
+                        "The texture {file} stays away: together with the textures before it, it "
+                        "needs {room:,} bytes, at most {limit:,} are allowed for files of their "
                         "size."
                     ),
                     file=path.name,

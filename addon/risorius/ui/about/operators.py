@@ -49,8 +49,8 @@ def describe(rig: ArmatureObject) -> list[str]:
         levels = ", ".join(str(level) for level in lods.levels_of(item))
         line = words.say(
             (
-                "{mesh}: level {levels}, {vertices:,} vertices, {channels} blend shape channels "
-                "move it, {real} of them as real shape keys."
+                "{mesh}: level {levels}, {vertices:,} vertices, {channels} channels move it, "
+                "{real} of them as real keys."
             ),
             mesh=item.name,
             levels=levels,

@@ -150,7 +150,7 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         return [
             words.say(
                 (
-                    "Remaining distance to the mesh: {mean} mm (root mean square), at most "
+                    "Left over: {mean} mm of distance to the mesh (root mean square), at most "
                     "{most} mm; the worst frame is {frame}."
                 ),
                 mean=f"{np.sqrt((frames**2).mean()):.3f}",

@@ -51,9 +51,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, Panel):
 def _where(chosen: RISORIUS_PG_live) -> str:
     """A sentence with the address that the user types into the capture app."""
     if not chosen.everywhere:
-        return words.say(
-            "Only programs on this computer can send, to 127.0.0.1, port {port}.", port=chosen.port
-        )
+        return words.say("Hears this computer only, at 127.0.0.1, port {port}.", port=chosen.port)
     address = capture.address() or words.say("this computer's address")
     return words.say("In the app: {address}, port {port}.", address=address, port=chosen.port)
 
@@ -64,7 +62,7 @@ def _draw_waiting(layout: UILayout) -> None:
         box = layout.box()
         count = len(recording.take)
         text = words.say(
-            "{name}: a recording of {count} frames waits", name=recording.face, count=count
+            "{name}: {count} faces wait in a recording", name=recording.face, count=count
         )
         words.show(box, names.printable(text, 60), "REC")
         row = box.row(align=True)

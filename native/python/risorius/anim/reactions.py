@@ -130,8 +130,8 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
         pairs = tuple((prefix + a, prefix + b) for a, b in rows)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ArgumentError(
-            f"{where}: tables [[yields]] with the keys by and of, and a table [opposites] "
-            f"with pairs were expected: {error!r}"
+            f"{where}: tables of yields with by and of, and pairs of opposites were expected: "
+            f"{error!r}"
         ) from None
     return Exclusives(yields, pairs)
 

@@ -93,7 +93,7 @@ def complain(args: argparse.Namespace) -> None:
             f"{args.text}: --transcript reads it"
         )
     if args.phonemes is not None and args.phonemes.resolve() == args.out.resolve():
-        raise CommandLineError("--phonemes: another file than the file of -o was expected")
+        raise CommandLineError("--phonemes: another file than that of -o was expected")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -108,8 +108,8 @@ class Points:
         found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():
             raise GameFaceError(
-                f"{self._face}: vertices within 10 km of the origin were expected, found a vertex "
-                "that is farther away or not finite"
+                f"{self._face}: vertices within 10 km of the origin were expected, one is no "
+                "number or farther away"
             )
         return found
 

@@ -127,7 +127,10 @@ class Document:
         if self.whole(view, "byteStride", view_at, dtype.itemsize) != dtype.itemsize:
             raise self.fail(
                 view_at,
-                f"numbers without gaps were expected, found the byteStride {view['byteStride']}",
+                (
+                    "numbers close together were expected, without the gaps of the "
+                    f"byteStride {view['byteStride']}"
+                ),
             )
         found = self._viewed(accessor, at, dtype, (count, 1))[:, 0]
         self.budget.hold(count * 3 * 8, at)
@@ -586,7 +589,7 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
         if not parts[3].isdigit() or int(parts[3]) >= len(names):
             raise document.fail(
                 place,
-                (f"the number of a weight below {len(names)} was expected, found {path[:80]!r}"),
+                (f"a weight of {len(names)} was expected, found {path[:80]!r}"),
             )
         return [names[int(parts[3])]]
     # Custom properties of a rig are in "extras". Other animated properties, such as colours, are

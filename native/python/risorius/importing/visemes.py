@@ -106,7 +106,7 @@ def _take(
         raise AnimationFileError(name, "mouth shapes with a length were expected, found none")
     if cues[-1].end > LONGEST:
         raise AnimationFileError(
-            name, f"times up to {LONGEST:g} s were expected, found {cues[-1].end:g} s"
+            name, f"times to {LONGEST:g} s were expected, found {cues[-1].end:g} s"
         )
     count = int(np.ceil(cues[-1].end * RATE - 1e-6)) + 1
     shapes = len({cue.shape for cue in cues})

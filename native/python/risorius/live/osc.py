@@ -129,8 +129,8 @@ class Decoder:
             face = _Face(sender)
             if not self._faces.add(sender, face, now, sender):
                 raise LiveError(
-                    f"{MOST} senders are received at once: another sender is received only if it "
-                    "is named as the subject to follow"
+                    f"{MOST} senders are received at once: there is no room for another that is "
+                    "not named as the subject to follow"
                 )
         time, done = bundle_time(data), []
         for address, values in found:

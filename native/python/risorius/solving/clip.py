@@ -457,7 +457,8 @@ def _frame_count(frames: dict[int, Floats]) -> int:
     counts = {len(array) for array in frames.values()}
     if len(counts) > 1 or 0 in counts:
         raise ArgumentError(
-            f"frames: the same number of frames for each mesh was expected, found {sorted(counts)}"
+            "frames: as many frames for each mesh, and at least one, were expected, found "
+            f"{sorted(counts)}"
         )
     return counts.pop()
 

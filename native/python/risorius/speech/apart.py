@@ -144,7 +144,7 @@ def python_program() -> str:
         if name.startswith("python") and os.path.isfile(place):
             return place
     raise RecogniserError(
-        "speech recognition runs in a separate process of Python: no Python program was found in "
+        "speech recognition runs in a separate program of Python: none was found in "
         f"{sys.exec_prefix}"
     )
 
@@ -173,8 +173,8 @@ def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterat
         except queue.Empty:
             if monotonic() - heard > _PATIENCE:
                 raise RecogniserError(
-                    f"the process of the speech recogniser sent nothing for {_PATIENCE:g} s "
-                    "and was ended"
+                    f"the process of the speech recogniser said nothing for {_PATIENCE:g} s and "
+                    "was ended"
                 ) from None
             continue
         if not line:

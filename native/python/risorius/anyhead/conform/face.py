@@ -117,8 +117,7 @@ def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Dou
             )
         if not (np.abs(out[name]) <= FARTHEST).all():
             raise ArgumentError(
-                f"{name}: finite positions of the vertices were expected, found a position with "
-                "NaN or infinity"
+                f"{name}: a vertex lies at no place that a number can say (NaN or infinity)"
             )
     own = out[dna.mesh_names[skin]]
     if np.ptp(own, axis=0).max() <= 0:

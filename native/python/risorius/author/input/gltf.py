@@ -158,7 +158,7 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
         raise document.fail(
             place,
             (
-                "the same number of morph targets in all primitives was expected, found "
+                "as many morph targets in all primitives as in the first were expected, found "
                 f"{sorted(counts)}"
             ),
         )

@@ -217,8 +217,7 @@ def make_shape_face(
     names = [name for name, _, _ in deltas]
     if not deltas:
         raise ArgumentError(
-            "at least one expression that becomes a control was expected: all expressions are "
-            "left out"
+            "at least one expression that becomes a control was expected: all are left out"
         )
     dna = Dna()
     dna.name, dna.db_name = shapes.name, "risorius"

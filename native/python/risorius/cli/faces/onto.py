@@ -109,7 +109,7 @@ def check_arguments(args: argparse.Namespace) -> None:
         return
     if args.names is not None:
         raise CommandLineError(
-            "author: --names needs a head with expressions and is not possible with --onto"
+            "author: --names is of a head with expressions and is not possible with --onto"
         )
     if args.out is None:
         raise CommandLineError("author: -o OUT.dna was expected")

@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     refuse_same_file(str(args.file), str(out))
     require_writable(out)
     if args.licence and not args.vrm:
-        raise CommandLineError("--licence needs a VRM: add --vrm 1.0 or --vrm 0.x")
+        raise CommandLineError("--licence is of a VRM file: add --vrm 1.0 or --vrm 0.x")
     if args.takes and args.within is None:
         raise CommandLineError("--takes needs combinations: add --within, such as --within 0.5")
     _check_body(args, out)
@@ -170,7 +170,7 @@ def _check_body(args: argparse.Namespace, out: Path) -> None:
     if args.humanoid:
         raise CommandLineError(
             "--humanoid is not possible with --body, because both give the bones of a body: "
-            "leave one of them out"
+            "leave it or --body out"
         )
     require_suffix(args.body, SUFFIXES, "--body")
     refuse_same_file(str(args.body), str(out))

@@ -141,7 +141,7 @@ def _humanoid(found: Mapping[str, int], kind: str) -> tuple[list[str], list[str]
     if missing := [name for name in humanoid.NEEDED if name not in bones]:
         raise GameFaceError(
             f"a humanoid has {len(humanoid.NEEDED)} bones, the face has no {joined(missing)}: "
-            "--humanoid minimal adds them"
+            "--humanoid minimal makes them up"
         )
     return bones, [humanoid.parent_of(name, bones) for name in bones]
 
