@@ -116,15 +116,18 @@ def blocks(path: Path, lines: list[str], about: str, mark: str) -> Iterator[Item
 
 def page_sentences(path: Path) -> Iterator[Item]:
     """Sentences of a Markdown page without its code blocks, tables and headings."""
-    text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.S)
+    text = re.sub(r"```\w*\n(.*?)```", _indented, path.read_text(encoding="utf-8"), flags=re.S)
+    text = re.sub(r"^(#+ .*)$", r"\n\1\n", text, flags=re.M)
     headings: list[str] = []
     lead = ""
-    paragraphs = re.split(r"\n\s*\n|\n(?=\s*[-*\d]+\.? )", text)
+    paragraphs = re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )", text)
     for paragraph, after in zip(paragraphs, [*paragraphs[1:], ""], strict=True):
         whole, is_item = one_line(paragraph), re.match(r"\s*(?:[-*]|\d+\.) ", paragraph)
+        if not is_item and paragraph.startswith("    "):  # code
+            continue
         if whole.startswith("#"):
             headings, lead = [*headings[:1], whole.lstrip("# ")], ""
-        elif "|" not in paragraph and (is_item or not paragraph.startswith("    ")):
+        elif "|" not in paragraph:
             lead = lead if is_item else whole
             context = f"{lead} {whole}" if is_item and lead.endswith(":") else whole
             if whole.endswith(":"):
@@ -132,6 +135,11 @@ def page_sentences(path: Path) -> Iterator[Item]:
             for sentence in re.split(r"(?<=[.!?])\s+(?=[A-Z*`\[])", whole):
                 if len(sentence.split()) > 3 and not sentence.startswith("!["):
                     yield place_of(path), context, " > ".join(headings) or path.stem, sentence
+
+
+def _indented(block: re.Match[str]) -> str:
+    """A fenced block of code as an indented one, which the sentence before it may show."""
+    return "\n" + "".join(f"    {line}\n" for line in block[1].splitlines()) + "\n"
 
 
 def interface_sentences() -> Iterator[Item]:
