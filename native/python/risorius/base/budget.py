@@ -81,7 +81,7 @@ def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
     """What remains of `left` after `count` is taken. Raises: BudgetError: `left` is too small."""
     if not count <= left:  # True for NaN too
         raise BudgetError(
-            f"{wanted} would be needed in addition to the {most - left:,} {done} before; "
+            f"{wanted} more than the {most - left:,} {done} before would be needed, "
             f"at most {most:,} in total were expected for input of this size"
         )
     return left - int(count)

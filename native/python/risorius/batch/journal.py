@@ -77,7 +77,7 @@ class Journal:
         """
         record = _parsed(self._line_of(name))
         if not isinstance(record, dict) or not isinstance(record.get("facts"), dict):
-            raise JobsError(f"{self.path}: another program changed this file while the batch ran")
+            raise JobsError(f"{self.path}: somebody else has changed it while this batch ran")
         return dict(record["facts"])
 
     def begin(self, kept: Iterable[str]) -> None:

@@ -337,7 +337,9 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
     for number, (identity, node) in enumerate(stacks.items()):
         if take in (object_name(node), str(number)):
             return [identity]
-    raise AnimationFileError(scene.name, f"an animation {take!r} was expected, found none")
+    raise AnimationFileError(
+        scene.name, f"an animation {take!r} was expected, found none with this name or number"
+    )
 
 
 def _curves(

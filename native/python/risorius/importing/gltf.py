@@ -531,7 +531,9 @@ def _chosen(document: Document, animations: Sequence[Any], take: str | None) -> 
     for i, animation in enumerate(animations):
         if isinstance(animation, dict) and take in (animation.get("name"), str(i)):
             return [i]
-    raise AnimationFileError(document.name, f"an animation {take!r} was expected, found none")
+    raise AnimationFileError(
+        document.name, f"an animation {take!r} was expected, found none with this name or number"
+    )
 
 
 def _curves(

@@ -375,7 +375,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
         if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
             raise MappingError(
                 where,
-                (f"rows: {key} was expected, because the mapping in base spells this name so"),
+                (f"rows: {key} is in the base with another spelling: use the spelling of the base"),
             )
     shares = _shares(_table(table, "shares", where), prefix, where)
     controls = {
@@ -497,8 +497,8 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
         raise MappingError(
             where,
             (
-                f"rows.{key}: a * was expected at the end of the control's name, or in "
-                "the names of both curve and control"
+                f"rows.{key}: a * was expected at the end of a control, or in both the curve and "
+                "the control"
             ),
         )
     return out

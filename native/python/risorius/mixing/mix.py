@@ -56,7 +56,7 @@ class Mix:
         for region, own in self.regions.items():
             if region not in REGIONS:
                 known = ", ".join(REGIONS)
-                raise ArgumentError(f"one of the regions {known} was expected, found {region!r}")
+                raise ArgumentError(f"a region of {known} was expected, found {region!r}")
             given = np.zeros(len(whole))
             for parent, share in own.items():
                 given[parent] = share

@@ -80,7 +80,7 @@ def checked(table: Mapping[str, Any], version: str, where: str) -> dict[str, Any
     known = {**asked, **_MORE, **{f: k for own in ASKED.values() for f, k in own.items()}}
     for field, value in table.items():
         if field not in known:
-            raise GameFaceError(f"{where}: {field}: one of the fields {joined(known)} was expected")
+            raise GameFaceError(f"{where}: {field}: a field of {joined(known)} was expected")
         if not _is_good(value, known[field]):
             raise GameFaceError(
                 f"{where}: {field}: {_said(known[field])} was expected, found {value!r}"
