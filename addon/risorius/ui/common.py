@@ -26,7 +26,14 @@ MODES = (
             "posed. The face uses Live if needed"
         ),
     ),
-    ("LIVE", "Live", "One shape key per mesh below the armature modifier; bones are posed"),
+    (
+        "LIVE",
+        "Live",
+        (
+            "Each mesh has one shape key, and its armature modifier acts after the key; bones "
+            "are posed"
+        ),
+    ),
     (
         "KEYS",
         "Shape Keys",

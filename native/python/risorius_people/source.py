@@ -169,7 +169,7 @@ class Source:
 
     def __init__(self, path: Path) -> None:
         if digest(path) != SHA256:
-            raise SourceError(f"{path} has another hash than {PACKAGE}")
+            raise SourceError(f"{path}: the hash of {PACKAGE} was expected, found another hash")
         self._zip = zipfile.ZipFile(path)
         self._names = frozenset(self._zip.namelist())
 

@@ -160,7 +160,7 @@ def keys_of(
         worst = frames[np.argmax(np.abs(frames))]
         raise ClipError(
             told(
-                "frame {worst:.0f} is beyond what Blender can play (at most frame {last_frame})",
+                ("frame {worst:.0f} is beyond what Blender can play (at most frame {last_frame})"),
                 worst=worst,
                 last_frame=LAST_FRAME,
             )

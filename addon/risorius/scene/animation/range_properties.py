@@ -61,7 +61,7 @@ class RISORIUS_PG_range(bpy.types.PropertyGroup):
     )
     extreme: bpy.props.FloatProperty(
         name="Extreme",
-        description="Captured value at which the face can go no further, which becomes 1",
+        description="Captured value of the full movement, which becomes 1",
         default=1.0,
         min=0.0,
         max=2.8,

@@ -140,7 +140,7 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
     if said is None:
         return _most(packed)
     if not isinstance(said, str) or not said.isdecimal() or len(said) > 15:
-        raise ContentError(told("the stored length of its file is no number"))
+        raise ContentError(told("the stored length of the DNA file is no number"))
     if int(said) > _most(packed):
         raise ContentError(
             told(

@@ -187,7 +187,10 @@ class _Job:
             if block.mute or block.vertex_group:
                 self.report.append(
                     told(
-                        "{name}: the mute or mask of the key {key} is not written.",
+                        (
+                            "{name}: the muting or the vertex group of the shape key {key} "
+                            "is not written."
+                        ),
                         name=name,
                         key=key,
                     )

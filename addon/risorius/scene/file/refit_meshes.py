@@ -311,8 +311,8 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
     change.report.append(
         told(
             (
-                "The mesh {label} is not in the DNA file; in the scene this mesh stays, "
-                "hidden, for {things}."
+                "The mesh {label} is not in the DNA file; in the scene this mesh stays, hidden, "
+                "for {things}."
             ),
             label=label,
             things=", ".join(things),

@@ -82,9 +82,10 @@ def _room_for(path: Path) -> int:
     if room > limit:
         raise ValueError(
             told(
-                "The texture {file} of {width:,} x {height:,} pixels stays away: it "
-                "needs {room:,} bytes, at most {limit:,} are allowed for a file of "
-                "its size.",
+                (
+                    "The texture {file} of {width:,} x {height:,} pixels stays away: it needs "
+                    "{room:,} bytes, at most {limit:,} are allowed for a file of its size."
+                ),
                 file=path.name,
                 width=width,
                 height=height,
@@ -172,9 +173,11 @@ class Images:
         if self._room + room > limit:
             raise ValueError(
                 told(
-                    "The texture {file} stays away: together with the textures "
-                    "before it, it needs {room:,} bytes, at most {limit:,} are "
-                    "allowed for files of their size.",
+                    (
+                        "The texture {file} stays away: together with the textures before it, it "
+                        "needs {room:,} bytes, at most {limit:,} are allowed for files of their "
+                        "size."
+                    ),
                     file=path.name,
                     room=self._room + room,
                     limit=limit,

@@ -55,9 +55,8 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     error: bpy.props.FloatProperty(
         name="Largest Error",
         description=(
-            "Remove keys as long as the curve stays within this distance of "
-            "every baked value, in the units of each curve; 0 keeps a key at "
-            "every frame"
+            "Remove keys as long as the curve stays within this distance of every baked value, "
+            "in the units of each curve; 0 keeps a key at every step"
         ),
         default=0.0,
         min=0.0,

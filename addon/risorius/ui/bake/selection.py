@@ -85,7 +85,7 @@ class FrameRange(OperatorBase):
     )
     lod: bpy.props.IntProperty(
         name="Detail",
-        description="-1 is the level that the viewport shows",
+        description="Level of detail: 0 is the finest, -1 the level that the viewport shows",
         default=-1,
         min=-1,
         max=31,

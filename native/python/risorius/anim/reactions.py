@@ -131,7 +131,8 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
         pairs = tuple((prefix + a, prefix + b) for a, b in rows)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ArgumentError(
-            f"{where}: yields with by and of, and pairs of opposites were expected: {error!r}"
+            f"{where}: tables of yields with by and of, and pairs of opposites were expected: "
+            f"{error!r}"
         ) from None
     return Exclusives(yields, pairs)
 

@@ -275,8 +275,10 @@ def _find(table: _Table, key: str, base: Path) -> list[_Found]:
             if path in out:
                 raise table.error(
                     key,
-                    f"each file once was expected, found {path} by {out[path][1]!r} and "
-                    f"{pattern!r}",
+                    (
+                        f"each file once was expected, found {path} by the patterns "
+                        f"{out[path][1]!r} and {pattern!r}"
+                    ),
                 )
             folder = os.path.relpath(path.parent, root).replace(os.sep, "/")
             out[path] = (_Found(path, "" if folder == "." else folder), pattern)

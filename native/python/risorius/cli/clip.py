@@ -368,7 +368,7 @@ def run_mappings(args: argparse.Namespace) -> int:
         )
     target = args.output or Path(f"{args.write}.toml")
     if target.exists():
-        raise CommandLineError(f"{target}: it is there already")
+        raise CommandLineError(f"{target}: a new file was expected, but it is there already")
     importing.write_text(importing.mapping_text(args.write), target)
     print(target)
     return 0

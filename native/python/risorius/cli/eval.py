@@ -226,7 +226,9 @@ def check_options(args: argparse.Namespace) -> None:
         if getattr(args, name) not in (None, False):
             raise CommandLineError(f"--{name} is for the frames of a clip, for which -o is missing")
     if any(text.lower().endswith(".dna") and "=" not in text for text in args.controls):
-        raise CommandLineError("a clip on a character: -o OUT.npz or -o OUT.csv was expected")
+        raise CommandLineError(
+            "to evaluate a clip on a character, -o OUT.npz or -o OUT.csv was expected"
+        )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
 def _save(take: Take, shaper: Shaper, path: Path) -> None:
     """Write the take; report dropped frames, and curves of the app that no control uses."""
     if not len(take):
-        raise InputError(f"{path} was not written: no face came")
+        raise InputError(f"{path} was not written: no face came from the app")
     if take.full:
         print(f"risorius: the take is full: {take.full} frames were left out", file=sys.stderr)
     if missed := take.unmapped(shaper):

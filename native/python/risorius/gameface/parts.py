@@ -109,8 +109,8 @@ class Points:
         found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():
             raise GameFaceError(
-                f"{self._face}: vertices nearer than 10 km were expected, "
-                "one is no number or farther"
+                f"{self._face}: vertices within 10 km of the origin were expected, one is no "
+                "number or farther away"
             )
         return found
 

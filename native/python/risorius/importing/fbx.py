@@ -64,7 +64,7 @@ class Packed:
                 data = memoryview(zlib.decompressobj().decompress(data, wanted + 1))
             except zlib.error as error:
                 raise self.parser.fail(
-                    self.at, f"an array that zlib packed was expected: {error}"
+                    self.at, f"an array packed with zlib was expected: {error}"
                 ) from error
         if len(data) != wanted:
             raise self.parser.fail(
@@ -338,7 +338,9 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
     for number, (identity, node) in enumerate(stacks.items()):
         if take in (object_name(node), str(number)):
             return [identity]
-    raise AnimationFileError(scene.name, f"an animation {take!r} was expected, found none")
+    raise AnimationFileError(
+        scene.name, f"an animation {take!r} was expected, found none with this name or number"
+    )
 
 
 def _curves(

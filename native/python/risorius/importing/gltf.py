@@ -128,7 +128,10 @@ class Document:
         if self.whole(view, "byteStride", view_at, dtype.itemsize) != dtype.itemsize:
             raise self.fail(
                 view_at,
-                f"numbers close together were expected, found the byteStride {view['byteStride']}",
+                (
+                    "numbers close together were expected, without the gaps of the "
+                    f"byteStride {view['byteStride']}"
+                ),
             )
         found = self._viewed(accessor, at, dtype, (count, 1))[:, 0]
         self.budget.hold(count * 3 * 8, at)
@@ -554,7 +557,9 @@ def _chosen(document: Document, animations: Sequence[Any], take: str | None) -> 
     for i, animation in enumerate(animations):
         if isinstance(animation, dict) and take in (animation.get("name"), str(i)):
             return [i]
-    raise AnimationFileError(document.name, f"an animation {take!r} was expected, found none")
+    raise AnimationFileError(
+        document.name, f"an animation {take!r} was expected, found none with this name or number"
+    )
 
 
 def _curves(
@@ -618,7 +623,8 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
             return names
         if not parts[3].isdigit() or int(parts[3]) >= len(names):
             raise document.fail(
-                place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
+                place,
+                (f"a weight of {len(names)} was expected, found {path[:80]!r}"),
             )
         return [names[int(parts[3])]]
     # Custom properties of a rig are in "extras". Other animated properties, such as colours, are

@@ -388,7 +388,10 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
     rows |= {key: {} for key in _texts(table, "ignore", where)}
     for key in mapping.rows:  # a row of the base is replaced only by exactly its name
         if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
-            raise MappingError(where, f"rows: {key} is in the base with another spelling")
+            raise MappingError(
+                where,
+                (f"rows: {key} is in the base with another spelling: use the spelling of the base"),
+            )
     shares = _shares(_table(table, "shares", where), prefix, where)
     controls = {
         key: _adjustment(key, value, where)
@@ -517,7 +520,11 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
             out[name] = out.get(name, 0.0) + weight * part
     if "*" not in key and any("*" in control for control in out):
         raise MappingError(
-            where, f"rows.{key}: a * was expected at the end of a control, or in both"
+            where,
+            (
+                f"rows.{key}: a * was expected at the end of a control, or in both the curve and "
+                "the control"
+            ),
         )
     return out
 

@@ -195,7 +195,7 @@ def _levels(dna: Dna, lods: Sequence[int] | None) -> list[int]:
         if not 0 <= lod < count:
             raise ArgumentError(f"lods: 0 to {count - 1} were expected, found {lod}")
     if not lods:
-        raise ArgumentError("lods: a level at least was expected")
+        raise ArgumentError("lods: at least one level of detail was expected, found none")
     return sorted(set(lods))
 
 

@@ -69,7 +69,10 @@ def decode(data: bytes) -> Packet:
         raise LiveError(f"{4 * count} bytes of values were expected, found {len(data) - place - 1}")
     values = np.frombuffer(data, ">f4", count, place + 1).astype(np.float32) * _SIGNS[:count]
     if not (np.abs(values) <= _LARGEST).all():  # also false for NaN
-        raise LiveError(f"a value of a face was expected, found {values[_worst(values)]}")
+        worst = values[_worst(values)]
+        raise LiveError(
+            f"a value of a face was expected, found {worst}: at most {_LARGEST:g} in size"
+        )
     return Packet(subject, device, time, NAMES[:count], values)
 
 

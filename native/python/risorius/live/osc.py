@@ -130,8 +130,8 @@ class Decoder:
             face = _Face(sender)
             if not self._faces.add(sender, face, now, sender):
                 raise LiveError(
-                    f"{MOST} senders are heard at once: there is no room for another that is not "
-                    "named as the subject to follow"
+                    f"{MOST} senders are received at once: there is no room for another that is "
+                    "not named as the subject to follow"
                 )
         time, done = bundle_time(data), []
         for address, values in found:
@@ -223,7 +223,9 @@ def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
         raise LiveError(f"{count} numbers were expected, found {len(values)}")
     numbers = tuple(float(v) if isinstance(v, int | float) else math.nan for v in values[:count])
     if not all(abs(v) <= _LARGEST * 10.0 for v in numbers):
-        raise LiveError(f"numbers of a face were expected, found {numbers}")
+        raise LiveError(
+            f"numbers of a face were expected, found {numbers}: at most {_LARGEST * 10.0:g} in size"
+        )
     return numbers
 
 
@@ -234,7 +236,9 @@ def _named(name: Any, value: Any) -> tuple[str, dict[str, float]]:
         return name, {}
     (number,) = _numbers([value], 1)
     if abs(number) > _LARGEST:
-        raise LiveError(f"{name}: a value of a face was expected, found {number}")
+        raise LiveError(
+            f"{name}: a value of a face was expected, found {number}: at most {_LARGEST:g} in size"
+        )
     unit = name if name.startswith("CTRL_") else unit_name(name)
     return unit, {unit: number}
 

@@ -42,7 +42,7 @@ class Mix:
         invalid share, or shares that are all 0."""
         whole = np.array(self.shares, np.float64)
         if not len(whole) or not np.isfinite(whole).all() or (whole < 0).any() or not whole.sum():
-            raise ArgumentError("shares from 0 on were expected, one of them above 0")
+            raise ArgumentError("shares from 0 on were expected, at least one of them above 0")
         return np.asarray(whole / whole.sum())
 
     def table(self) -> Doubles:

@@ -111,8 +111,8 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
         there = texture_folder(path) / name
         if there.exists():
             raise ArgumentError(
-                f"{there}: a picture of this name is there, and no {path.name} that it belongs to: "
-                "another name for the new face was expected"
+                f"{there}: a picture of this name is there, and no {path.name} to which it "
+                "belongs: choose another name for the new face"
             )
 
 

@@ -520,7 +520,10 @@ def _meshes(
 def _frame_count(frames: dict[int, Floats]) -> int:
     counts = {len(array) for array in frames.values()}
     if len(counts) > 1 or 0 in counts:
-        raise ArgumentError(f"frames: as many of each mesh were expected, found {sorted(counts)}")
+        raise ArgumentError(
+            "frames: as many frames for each mesh, and at least one, were expected, found "
+            f"{sorted(counts)}"
+        )
     return counts.pop()
 
 

@@ -112,7 +112,10 @@ def structure(
         return make(**{field: keywords[field] for field in own})
     if own:
         found = ", ".join(sorted(own))
-        raise ArgumentError(f"{name}: no {found} beside it was expected, found both")
+        raise ArgumentError(
+            f"{name}: {found} is one of its fields; only one of the two arguments was expected, "
+            "found both"
+        )
     return given
 
 

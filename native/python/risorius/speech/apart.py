@@ -131,7 +131,7 @@ def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
         )
     except OSError as error:
         raise RecogniserError(
-            f"the recogniser's process could not be started: {python}: {error.strerror}"
+            f"the process of the speech recogniser could not be started: {python}: {error.strerror}"
         ) from error
 
 
@@ -148,7 +148,7 @@ def python_program() -> str:
         if name.startswith("python") and os.path.isfile(place):
             return place
     raise RecogniserError(
-        f"speech needs the program of Python to run beside this one: none was found in "
+        "speech recognition runs in a separate program of Python: none was found in "
         f"{sys.exec_prefix}"
     )
 
@@ -177,7 +177,8 @@ def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterat
         except queue.Empty:
             if monotonic() - heard > _PATIENCE:
                 raise RecogniserError(
-                    f"the recogniser said nothing for {_PATIENCE:g} s and was ended"
+                    f"the process of the speech recogniser said nothing for {_PATIENCE:g} s and "
+                    "was ended"
                 ) from None
             continue
         if not line:

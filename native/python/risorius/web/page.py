@@ -303,6 +303,9 @@ def _sound(sound: Sound | None) -> dict[str, Any] | None:
         return None
     data, ending, offset = sound
     if ending.lower() not in _SOUNDS:
-        raise WebError(f"a sound ending in {' or '.join(SOUNDS)} was expected, found {ending!r}")
+        raise WebError(
+            f"a sound file with a name ending in {' or '.join(SOUNDS)} was expected, found "
+            f"{ending!r}"
+        )
     url = f"data:{_SOUNDS[ending.lower()]};base64,{base64.b64encode(data).decode()}"
     return {"url": url, "offset": offset}

@@ -116,7 +116,9 @@ def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Dou
                 f"{name}: {counts[name]:,} places were expected, found {len(out[name]):,}"
             )
         if not (np.abs(out[name]) <= FARTHEST).all():
-            raise ArgumentError(f"{name}: a vertex lies at no place that a number can say")
+            raise ArgumentError(
+                f"{name}: a vertex lies at no place that a number can say (NaN or infinity)"
+            )
     own = out[dna.mesh_names[skin]]
     if np.ptp(own, axis=0).max() <= 0:
         raise ArgumentError(f"{dna.mesh_names[skin]}: all vertices lie at one place")

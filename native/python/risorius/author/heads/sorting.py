@@ -63,8 +63,8 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
     if others and not wanted:
         names = joined([face.name, *(part.name for part in others)])
         raise ShapeFileError(
-            f"{where}: one head was expected, {names} have the same shapes at places of their own: "
-            "source.mesh says which one is meant"
+            f"{where}: one head was expected, {names} have the same shapes at different places: "
+            "name one of them in source.mesh"
         )
     return face
 

@@ -156,7 +156,11 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
     counts = {len(part.deltas) for part in parts}
     if len(counts) != 1:
         raise document.fail(
-            place, f"as many morph targets in all primitives were expected, found {sorted(counts)}"
+            place,
+            (
+                "as many morph targets in all primitives as in the first were expected, found "
+                f"{sorted(counts)}"
+            ),
         )
     names = _names(row, counts.pop())
     corners = np.concatenate(triangles)

@@ -32,8 +32,8 @@ def find_neutral(folder: Path) -> Path:
         if exact is not None or len(named) == 1:
             return exact or named[0]
     raise ShapeFileError(
-        f"{folder}: an OBJ file called {', '.join(_NEUTRAL)} was expected beside those of the "
-        f"expressions, found {len(files)} others"
+        f"{folder}: an OBJ file called {', '.join(_NEUTRAL)} was expected beside the OBJ files of "
+        f"the expressions, found {len(files)} other files"
     )
 
 

@@ -47,13 +47,17 @@ def meaning_of(value: Said) -> SaidMeaning:
         name = given[0][1:]
         if not _NAME.fullmatch(name):
             raise GivenError(
-                f"letters, digits, _ and - were expected of an expression, found {shown(name)}"
+                "letters, digits, _ and - were expected in the name of an expression, found "
+                f"{shown(name)}"
             )
         return SaidMeaning((), name)
     controls: list[str] = []
     for part in given:
         if part.startswith("@"):
-            raise GivenError(f"an expression alone or controls were expected, found {shown(given)}")
+            raise GivenError(
+                "an expression alone or controls, but not both, were expected, found "
+                f"{shown(given)}"
+            )
         controls += _controls(part)
     return SaidMeaning(tuple(dict.fromkeys(controls)), "")
 

@@ -217,7 +217,9 @@ def make_shape_face(
     deltas = _by_control(shapes, controls)
     names = [name for name, _, _ in deltas]
     if not deltas:
-        raise ArgumentError("an expression that is a control was expected: all are left out")
+        raise ArgumentError(
+            "at least one expression that becomes a control was expected: all are left out"
+        )
     dna = Dna()
     dna.name, dna.db_name = shapes.name, "risorius"
     dna.archetype, dna.gender = "other", "other"

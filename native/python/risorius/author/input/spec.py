@@ -158,7 +158,10 @@ def read_options(path: Path) -> tuple[RigOptions, CorrectiveOptions]:
     table = _read_tables(path)
     for name in ("source", "controls", "name"):
         if name in table:
-            raise ShapeFileError(f"{path}: {name}: a person of the sample has its own")
+            raise ShapeFileError(
+                f"{path}: {name}: a person of the sample has its own, so this file may contain "
+                "options only"
+            )
     return _options(path, table), _correctives(table.get("correctives", {}))
 
 

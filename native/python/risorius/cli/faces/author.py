@@ -139,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
         require_suffix(args.report, (".html",), "--report")
         fileio.check_writable(args.report)
         if args.report.resolve() == args.out.resolve():
-            raise CommandLineError("author: another file than that of -o was expected of --report")
+            raise CommandLineError("author: --report: another file than that of -o was expected")
         need_plot()
     options = replace(options, kept=(*options.kept, *read.kept))
     source = dna

@@ -184,7 +184,7 @@ class Meshes:
             out[name] = values[name].astype("<u2")
         places = np.einsum("vij,vj->vi", linear, values["POSITION"]) + blended[:, :3, 3]
         if not np.isfinite(places).all() or np.abs(places).max(initial=0.0) > 1e6:
-            raise document.fail(at, "vertices nearer than 1,000 km were expected")
+            raise document.fail(at, "vertices within 1,000 km of the origin were expected")
         out["POSITION"] = places.astype("<f4")
         turn = _cofactors(linear)
         if "NORMAL" in values:

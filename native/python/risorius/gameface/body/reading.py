@@ -113,8 +113,8 @@ def read_body(
     wanted = humanoid.NEEDED if needs_all else ("head",)
     if missing := [name for name in wanted if name not in bones]:
         raise GameFaceError(
-            f"{path}: the body has no bone {joined(missing)}: its VRM extension, or names of "
-            "Unreal, Mixamo or VRM, say the bones"
+            f"{path}: the body has no bone {joined(missing)}: name the bones in its VRM "
+            "extension, or as in Unreal, Mixamo or VRM"
         )
     at = {name: tree.world[node][:3, 3] for name, node in bones.items()}
     scale = scale or _scale_of(at)

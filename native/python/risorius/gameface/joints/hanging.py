@@ -36,7 +36,9 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
     """
     own = skeleton.bones
     if "head" not in own:
-        raise GameFaceError("a joint called head was expected, which a body's head bone takes")
+        raise GameFaceError(
+            "a joint called head was expected, because it is attached to the head bone of the body"
+        )
     meet = _EYES if all(n in own and n in body.bones for n in _EYES) else ("head",)
     move = _apart(skeleton, body, meet)
     heads = _apart(skeleton, body, ("head",))
