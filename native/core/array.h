@@ -70,8 +70,9 @@ struct PlanarArray {
 using Vec3Array = PlanarArray<3>;
 using Vec2Array = PlanarArray<2>;
 
-/// A list of structs. Copies are deep. Assigning a list replaces its storage; element_ptr() keeps
-/// the old storage alive, so that a Python object can still refer to an element of it.
+/// A list of structs. Copies are deep. Assigning a list replaces its storage; a pointer from
+/// element_ptr() keeps the old storage alive, so that a Python object can still refer to an element
+/// of it.
 template <class T>
 class List {
  public:

@@ -33,7 +33,7 @@ const char* to_string(ErrorCode code);
 
 /// An error.
 /// offset   byte offset in the file, if the error has one
-/// where    the DNA field, e.g. "behavior.joint_groups[3].values"
+/// where    the field of the DNA or clip, e.g. "behavior.joint_groups[3].values", or ""
 /// message  one sentence with the found and the expected value
 struct Error {
   ErrorCode code = ErrorCode::kInvalidValue;
@@ -41,7 +41,7 @@ struct Error {
   std::string where;
   std::string message;
 
-  /// One sentence for the user: message, field and offset.
+  /// One sentence for the user: the message, then "[where]" and "(byte offset)" if they are known.
   std::string describe() const;
 };
 

@@ -26,8 +26,8 @@ struct Shape {
   std::array<float, 3> delta;
 };
 
-/// A mesh of the file, sorted by vertex: influences and shapes of vertex v are [begins[v], begins[v
-/// + 1]).
+/// A mesh of the file. The influences of vertex v are influences[influence_begins[v]] up to, not
+/// including, influences[influence_begins[v + 1]]; shapes correspondingly.
 struct SkinMesh {
   std::vector<std::array<float, 3>> positions;  // file units
   std::vector<std::uint32_t> influence_begins;
@@ -39,9 +39,10 @@ struct SkinMesh {
 struct Surface {
   std::shared_ptr<const rig::Rig> rig;
   std::uint32_t lod = 0;
-  std::vector<std::uint32_t> parents;   // a root is its own parent
-  std::vector<std::uint32_t> order;     // joints, parents first
-  std::vector<Matrix> neutral_inverse;  // of each joint's transform in the neutral pose
+  std::vector<std::uint32_t> parents;  // [joints]; a root is its own parent
+  std::vector<std::uint32_t> order;    // joints, parents first
+  // [joints]: inverse of the joint's transform in the neutral pose, in the face's space.
+  std::vector<Matrix> neutral_inverse;
   std::vector<SkinMesh> meshes;
 };
 
