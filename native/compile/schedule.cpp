@@ -205,8 +205,8 @@ struct Order {
   std::vector<std::uint32_t> cyclic;  // members of cycles, and the nodes that depend on them
 };
 
-// Counts for each node how many nodes must still run before it, directly or because they write a
-// control that it reads.
+// Counts for each node the conditions that are not met yet: controls that it reads and that a
+// node must still write, and nodes that must run before it (Graph::after).
 class Waiting {
  public:
   // In: nodes  the nodes to run, each once; all others count as having run

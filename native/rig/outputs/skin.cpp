@@ -97,8 +97,9 @@ void put_vertex(const Lists& lists, std::size_t v, std::size_t at, std::size_t p
 }
 
 // Adds a run: vertices of a block with the same number of influences, rounded up to fours.
-// In: begin  first vertex of the block
-//     fours  number of groups of four influences of each vertex
+// In: begin     first vertex of the block
+//     vertices  the vertices of the run, relative to begin
+//     fours     number of groups of four influences of each vertex
 void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_t> vertices,
              std::uint32_t fours, Skin& skin) {
   skin.runs.push_back({static_cast<std::uint32_t>(vertices.size()), fours});

@@ -9,7 +9,7 @@
 
 namespace risorius::rig {
 
-/// Turns raw controls into a pose. Allocates nothing.
+/// Turns raw controls into a pose. Allocates nothing. A face without LODs stays at rest.
 /// In:   raw     float32[R], any values. Outside [0, 1] joints and blend shapes extrapolate,
 ///               correctives clamp their factors, and maps are 0 outside of their intervals. NaN or
 ///               infinity makes these outputs invalid: rows of joint groups that have the control
