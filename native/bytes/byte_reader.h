@@ -64,8 +64,9 @@ class ByteReader {
   std::uint32_t u32() { return number<std::uint32_t>(); }
   float f32() { return std::bit_cast<float>(u32()); }
   /// Reads the count of a list, a u32. It fails unless count * element_size bytes are left after it
-  /// and the count is at most the number of set_max_count(). Out: the count, 0 after a failure
-  /// In: element_size  smallest size of an element in the file, bytes
+  /// and the count is at most the number of set_max_count().
+  /// In:  element_size  smallest size of an element in the file, bytes
+  /// Out: the count, 0 after a failure
   std::uint32_t count(std::uint32_t element_size) {
     if (ready_ - at_ >= 4) {
       const std::uint32_t n = load<std::uint32_t>(at_);

@@ -284,7 +284,7 @@ class GraphCompiler {
   // The first layer of each network whose layers compute all rows at every LOD.
   std::map<std::uint16_t, std::uint32_t> layers_;
   std::vector<std::vector<std::uint32_t>> numbers_;
-  std::uint32_t first_ = 0;  // first operation of the type
+  std::uint32_t first_ = 0;  // index of the first operation of the type that add_type compiles
 };
 
 // Three rows, the directions of the axes x, y, z as (right, up, front).

@@ -16,7 +16,7 @@ namespace {
 
 using rig::RigData;
 
-// The first row in which each column rotates a quaternion joint; kNone: it rotates none.
+// [columns]: the first row in which the column rotates a quaternion joint; kNone: it rotates none.
 std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
                                               const std::vector<bool>& quaternion_joints) {
   const std::size_t columns = g.input_indices.size();

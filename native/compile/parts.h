@@ -23,7 +23,7 @@ using rig::RigData;
 /// that LOD.
 using Used = std::vector<std::vector<bool>>;
 
-/// The joint groups of a file in the order of the Rig, see list_groups().
+/// The joint groups of a file in the order of the Rig: groups that coarse LODs use come first.
 using Groups = std::vector<const dna::JointGroup*>;
 
 struct KeptMatrices;  // kept_matrices.h

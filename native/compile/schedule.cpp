@@ -30,8 +30,10 @@ std::span<const std::uint16_t> factors(const RigData& r, const rig::Psd& p) {
 // Many lists of numbers, stored one after the other in one array.
 class Lists {
  public:
-  // In: each  each(add) must call add(list, number) for all entries. It is called twice: to count
-  //           and to fill
+  // In: lists   number of lists
+  //     budget  charged 4 bytes for each entry
+  //     each    each(add) must call add(list, number) for all entries. It is called twice: to count
+  //             and to fill
   template <class Each>
   static Result<Lists> collect(std::size_t lists, Budget& budget, Each each) {
     Lists out;

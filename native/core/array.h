@@ -54,8 +54,8 @@ class Array {
   std::shared_ptr<const T> values_;
 };
 
-/// Three (or two) parallel planes of n floats in one buffer: x0..xn-1 y0..yn-1 z0..zn-1, as the
-/// format stores them. Python sees float32[n, planes] with strides.
+/// Three (or two) parallel planes of n floats in one buffer: x0..xn-1 y0..yn-1 z0..zn-1, as DNA
+/// files store them. Python sees float32[n, planes] with strides.
 template <std::size_t kPlanes>
 struct PlanarArray {
   Array<float> values;  // size = kPlanes * count()

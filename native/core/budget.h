@@ -16,7 +16,7 @@ class Budget {
  public:
   static constexpr std::uint64_t kUnlimited = ~std::uint64_t{0};
 
-  /// In: stage       first word of the error message, e.g. "compiling"
+  /// In: stage       the beginning of the error message, e.g. "compiling this face"
   ///     most_bytes  largest number of bytes that may be charged, or kUnlimited
   ///     most_steps  largest number of steps that may be charged, or kUnlimited
   Budget(std::string stage, std::uint64_t most_bytes, std::uint64_t most_steps)

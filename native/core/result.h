@@ -16,12 +16,12 @@ enum class ErrorCode {
   kNotClip,                // the file does not begin with the signature of a .rzc file
   kUnsupportedGeneration,  // a DNA file of a generation other than 2, or a clip of another version
   kTruncated,              // the bytes end inside a structure
-  kInvalidCount,           // a count that does not fit the remaining bytes or a limit
-  kInvalidLength,          // parallel lists of different lengths
+  kInvalidCount,           // a count that does not fit the remaining bytes
+  kInvalidLength,          // a list of a wrong length, such as parallel lists of different lengths
   kInvalidIndex,           // an index outside its range
   kInvalidValue,           // any other impossible value (cycle, LOD row beyond the matrix ...)
   kMissingLayer,           // the file lacks a layer that the operation needs
-  kLimitExceeded,          // more than the caller's limits allow
+  kLimitExceeded,          // more than a limit of the caller, an index or a budget allows
   kIoOpen,
   kIoRead,
   kIoWrite,

@@ -227,8 +227,8 @@ constexpr std::uint32_t step_index(std::uint32_t step) { return step & 0x3FFFFFF
 /// their dependencies. A *latent* one runs them in the fixed order of the reference evaluator's
 /// stages.
 enum StepList : std::uint32_t {
-  // Networks and solvers that need no corrective. A settled evaluation (settle = true) runs them
-  // before all correctives.
+  // Networks and solvers that need no corrective, directly or indirectly. A settled evaluation runs
+  // them before all correctives.
   kEarly,
   // The other networks and solvers, and the correctives that are not watched (see psds), each after
   // the steps that it reads. A settled evaluation runs all of these steps, a latent one only the

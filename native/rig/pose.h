@@ -114,10 +114,11 @@ struct alignas(128) Workspace {
   // A bit for each of quaternion_columns whose control is not 0; all are 0 between calls.
   std::vector<std::uint64_t> quaternion_bits;
   // Solvers and networks.
-  std::vector<double> solver;  // the inputs of a solver, then two values for each of its poses
-  std::vector<float> masks;    // [regions]: 0 skips the region's networks
+  // The inputs of a solver, then the kernel values of its poses, then the weights of its poses.
+  std::vector<double> solver;
+  std::vector<float> masks;                     // [regions]: 0 skips the region's networks
   core::AlignedVector<float> operation_values;  // results of operations
-  core::AlignedVector<float> layers[2];         // input and output of a network layer
+  core::AlignedVector<float> layers[2];         // input and output of a layer, each with a last 1
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // Memory of evaluate_frames, which evaluates kFrames frames together.
   std::vector<std::uint64_t> union_bits;  // a bit for each control that is not 0 in some frame

@@ -21,8 +21,8 @@ namespace risorius::simd {
 namespace {
 
 // For each mask of eight places, an entry for each place: the index of the value that the place
-// gets, with bit 7 set, or 0. The shuffle uses only the lowest three bits, the blend only the
-// highest.
+// gets, with bit 7 set, or 0 if the place gets none. The shuffle uses only the lowest three bits,
+// the blend only the highest.
 constexpr auto kExpandOrders = [] {
   std::array<std::array<std::uint8_t, 8>, 256> orders{};
   for (std::size_t mask = 0; mask < 256; ++mask) {

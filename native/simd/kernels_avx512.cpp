@@ -123,7 +123,8 @@ struct AllColumns {
     const __m512i column = _mm512_setr_epi32(x, x, x, x, y, y, y, y, z, z, z, z, w, w, w, w);
     return _mm512_mul_ps(sum.whole(), _mm512_maskz_permutexvar_ps(kAll, column, four));
   }
-  // For each of two vertices a and b: first plus third quarter, second plus fourth quarter.
+  // The four quarters of the result: a's first plus a's third quarter, a's second plus a's fourth,
+  // and the same two sums of b.
   RISORIUS_INLINE static __m512 halves(__m512 a, __m512 b) {
     return _mm512_add_ps(_mm512_maskz_shuffle_f32x4(kAll, a, b, 0x44),
                          _mm512_maskz_shuffle_f32x4(kAll, a, b, 0xEE));

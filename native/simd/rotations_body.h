@@ -18,8 +18,8 @@ namespace risorius::simd {
 
 namespace {
 
-constexpr std::size_t kTurns = 16;
-using Turns = float[kTurns];
+constexpr std::size_t kTurns = 16;  // rotations that are converted together
+using Turns = float[kTurns];        // one angle or quaternion component of each of them
 // The angles about all three axes are in one array, because one loop over all of them is faster
 // than three loops: the CPU computes more sines in parallel.
 constexpr std::size_t kAngles = 3 * kTurns;
@@ -153,14 +153,14 @@ RISORIUS_INLINE bool turns(const float* angles) {
   return (two | third) != 0;
 }
 
-// Collects the rotations that are not 0, and writes quaternions of no rotation for the others. A
-// batch of sixteen is computed only when 32 more have been collected, because it would otherwise
-// have to wait for the stores just before.
+// Lists the rotations that are not 0 in `turning`, and writes quaternions of no rotation for the
+// others. A batch of sixteen is computed only when 32 more have been listed, because the CPU would
+// otherwise have to wait for the entries of the list that it has just written.
 template <class Parts>
 RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which, std::size_t n,
                                  float* rotations, std::size_t stride) {
   constexpr std::size_t kBehind = 3 * kTurns;
-  std::uint32_t turning[17 * kTurns];  // offsets of the gathered rotations
+  std::uint32_t turning[17 * kTurns];  // offsets of the listed rotations
   std::size_t count = 0, done = 0;
   float elsewhere = 0;
   for (std::size_t i = 0; i < n; i += kTurns) {

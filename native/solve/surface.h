@@ -20,7 +20,8 @@ struct Influence {
   std::uint32_t joint;
   float weight;
 };
-/// The displacement that a blend shape channel at 1 adds to a vertex before skinning.
+/// The displacement, in file units, that a blend shape channel at 1 adds to a vertex before
+/// skinning.
 struct Shape {
   std::uint32_t channel;
   std::array<float, 3> delta;
@@ -55,7 +56,7 @@ core::Result<Surface> make_surface(const dna::Dna& dna, std::shared_ptr<const ri
                                    std::uint32_t lod);
 
 /// A joint's transform relative to its parent in a pose.
-/// In: delta  the joint's nine numbers of a Pose
+/// In: delta  the joint's nine numbers of a Pose, which are added to its neutral values
 Matrix local_matrix(const rig::Rig& rig, std::uint32_t joint, const float* delta);
 /// The matrix a * b, which applies b first.
 Matrix multiply(const Matrix& a, const Matrix& b);

@@ -16,7 +16,7 @@ namespace risorius::rig {
 /// Number of vertices in a block: so few that the first-level cache has room for them while they
 /// are read, summed and written.
 inline constexpr std::uint32_t kSkinBlock = 1024;
-/// A vertex does not move if the sum of its weights is at most this.
+/// A vertex does not move if the sum of its weights is at most this, or infinite.
 inline constexpr float kLeastWeight = 1e-4f;
 
 struct Skin {
@@ -25,8 +25,9 @@ struct Skin {
     std::size_t influence = 0;  // its first influence, an index into bones and weights
   };
   std::uint32_t vertex_count = 0, bone_count = 0;
-  std::vector<simd::SkinRun> runs;  // of each block, by ascending number of influences
-  std::vector<Block> blocks;        // one for each block, and one behind the last
+  // The runs of one block after the other, in a block by ascending number of influences.
+  std::vector<simd::SkinRun> runs;
+  std::vector<Block> blocks;  // one for each block, and one behind the last
   // The vertices of each run, relative to the first vertex of their block.
   std::vector<std::uint16_t> vertices;
   std::vector<std::uint16_t> bones;    // as in simd::SkinPart; bone_count stands for no bone

@@ -38,8 +38,9 @@ bool go_together(const Rig& rig, std::uint32_t lod) noexcept;
 ///      work      of make_batch_workspace
 /// Out: controls  [count, controls] all controls of each frame
 ///      work      frame_weights; active: the controls that are not 0 in at least one frame
-///      false, and nothing is done, if a raw control is -0: its channels would get -0 if every
-///      channel reads its control, but +0 if only the channels of active controls are written
+///      returns   false, without these results, if a raw control is -0: its channels would get -0
+///                if every channel reads its control, but +0 if only the channels of active
+///                controls are written
 bool frame_controls(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                     Workspace& work, float* controls) noexcept;
 /// Lists the set bits of work.union_bits in work.active, and clears the bits.
