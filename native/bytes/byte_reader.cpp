@@ -45,8 +45,8 @@ void ByteReader::clear_error() {
   bound();
 }
 
-// Finds the end of the bytes that can be read without a further check or refill. After a failure
-// there are no such bytes, so that fast paths need not test for one.
+// Sets ready_, the end of the bytes that can be read without a further check or refill. After a
+// failure there are no such bytes, so that fast paths need not test for a failure.
 void ByteReader::bound() {
   const auto loaded = static_cast<std::uint64_t>(loaded_ - at_);
   ready_ = failed() ? at_ : at_ + std::min(loaded, left());
@@ -88,8 +88,9 @@ bool ByteReader::check_left(std::uint64_t bytes) {
 
 bool ByteReader::need(std::size_t n) { return check_left(n) && refill(n, n); }
 
-// Reads more of the file into the window: at least n bytes, and more of the `wanted` bytes that
-// will be read soon, if the window has room. In: wanted <= left()
+// Reads the file into the window, so that it begins at the position and has at least n bytes, and
+// more of the `wanted` bytes that will be read soon, if it has room. Out: false, with an error, if
+// the file ends before. In: n  a few bytes; wanted  n to left()
 bool ByteReader::refill(std::size_t n, std::uint64_t wanted) {
   if (window_.size() == 0) window_.resize(kWindowBytes);
   const auto rest = static_cast<std::size_t>(loaded_ - at_);  // a few bytes of an incomplete number

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reads a whole file into memory, and tells whether it is the user's own.
+// Reads a whole file into memory, and tells whether only the user of this process can write it.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 namespace risorius::bytes {
 
 struct FileBytes {
-  std::span<const std::uint8_t> bytes;  // aligned to 64
+  std::span<const std::uint8_t> bytes;  // begin on a multiple of 64 bytes
   std::shared_ptr<const void> owner;    // keeps the bytes alive
-  /// The user of this process owns the file and nobody else may write to it. Checked on the open
-  /// file, not on its name. Always false on systems without access modes (Windows).
+  /// The user of this process owns the file, and its access mode lets nobody else write to it.
+  /// Checked on the open file, not on its name. Always false on Windows, which has no such modes.
   bool is_own = false;
 };
 

@@ -195,7 +195,8 @@ std::string hidden_name() {
   return name_begin() + std::to_string(process_number()) + "-" + token + std::string(kEnd);
 }
 
-// The number of the process that made a file with this hidden name; empty for other names.
+// The number of the process that made a file with this hidden name. Nullopt for other names and for
+// names of other machines. In: begin  result of name_begin()
 std::optional<long long> maker_of(std::string_view name, std::string_view begin) {
   constexpr std::size_t kTail = 1 + kTokenDigits + kEnd.size();
   if (!name.starts_with(begin) || !name.ends_with(kEnd)) return {};

@@ -70,7 +70,8 @@ std::vector<rig::RowRun> runs_of(const std::vector<rig::ConditionalRow>& rows) {
   return runs;
 }
 
-// Lists the channels of each control. The lists stay empty if two channels write one output.
+// Lists the channels of each control. The lists stay empty if two entries of shape_outputs are the
+// same channel.
 void list_shapes_of_controls(RigData& out) {
   std::vector<bool> taken(std::size_t{UINT16_MAX} + 1);
   for (const std::uint16_t output : out.shape_outputs) {
@@ -97,7 +98,8 @@ bool has_number_bounds(const rig::ConditionalRow& row) {
   return row.from == row.from && row.to == row.to;
 }
 
-// The first row of each row's range: rows of one GUI control with equal bounds form a range.
+// The first row of each row's range: rows of one GUI control with equal bounds form a range. A row
+// with a bound that is NaN is a range of its own. Out: steps  raised by the number of comparisons
 std::vector<std::uint32_t> first_rows_of_ranges(const std::vector<rig::ConditionalRow>& rows,
                                                 std::uint64_t& steps) {
   std::vector<std::uint32_t> order(rows.size()), first(rows.size());

@@ -30,8 +30,10 @@ std::span<const std::uint16_t> factors(const RigData& r, const rig::Psd& p) {
 // Many lists of numbers, stored one after the other in one array.
 class Lists {
  public:
-  // In: each  each(add) must call add(list, number) for all entries. It is called twice: to count
-  //           and to fill
+  // In: lists   number of lists
+  //     budget  charged 4 bytes for each entry
+  //     each    each(add) must call add(list, number) for all entries. It is called twice: to count
+  //             and to fill
   template <class Each>
   static Result<Lists> collect(std::size_t lists, Budget& budget, Each each) {
     Lists out;
@@ -205,8 +207,8 @@ struct Order {
   std::vector<std::uint32_t> cyclic;  // members of cycles, and the nodes that depend on them
 };
 
-// Counts for each node how many nodes must still run before it, directly or because they write a
-// control that it reads.
+// Counts for each node the conditions that are not met yet: controls that it reads and that a
+// node must still write, and nodes that must run before it (Graph::after).
 class Waiting {
  public:
   // In: nodes  the nodes to run, each once; all others count as having run

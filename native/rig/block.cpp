@@ -37,7 +37,7 @@ struct Place {
 struct BlockHeader {
   char magic[8];
   std::uint32_t byte_order, header_size;
-  std::uint64_t size, hash;  // hash of everything behind it
+  std::uint64_t size, hash;  // bytes of the whole block; XXH64 of everything behind the hash
   RigHeader rig;
   Place places[kArrays];
 };

@@ -36,7 +36,7 @@ core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels,
                            const LateValues& late = {});
 
 /// A Rig from the bytes of Rig::block(). Copies nothing: the bytes stay in the memory of `owner`.
-/// In:    bytes    aligned to 64
+/// In:    bytes    must begin on a multiple of 64 bytes
 ///        check    how much is checked
 ///        kernels  as in make_rig
 /// Fails: kInvalidValue, kInvalidIndex (bytes that are no Rig of this version and machine),

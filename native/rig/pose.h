@@ -40,7 +40,7 @@ enum class Traversal : std::uint8_t {
   kCounted,  // chooses one of the others in each frame, by counted bytes and columns
   kListed,   // only active controls, whose columns are first listed by group
   kAdded,    // only active controls, in the order of memory; a batch of frames lists them instead
-  kWhole     // all columns, in the order of group_columns, if all coefficients are finite
+  kWhole     // all columns, in the order of group_columns; kListed if a coefficient is not finite
 };
 
 /// The active controls for which a list in a workspace was computed. The list can be used again
@@ -79,11 +79,12 @@ struct alignas(128) Workspace {
   bool warm = false;
   // Correctives.
   KeptControls firing_for;              // the active controls for which firing holds
-  std::vector<std::uint16_t> firing;    // watched correctives that may not be 0; the first
-  std::size_t firing_count = 0;         // firing_count entries are valid
+  std::vector<std::uint16_t> firing;    // watched correctives that may not be 0, as indices into
+  std::size_t firing_count = 0;         // psds; the first firing_count entries are valid
   bool fires_all = false;               // true: no factor of the listed correctives is 0
   std::vector<std::uint64_t> psd_bits;  // a bit for each corrective control that is not 0
-  std::vector<float> last_controls;     // [controls]: the controls before the correctives ran
+  // [controls]: in a latent evaluation the controls before the correctives ran.
+  std::vector<float> last_controls;
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
   KeptControls listed_for;  // the active controls for which moves and blocks hold
@@ -98,30 +99,35 @@ struct alignas(128) Workspace {
   std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
   core::AlignedVector<float> rows;         // the rows of all groups
   core::AlignedVector<float> sums;         // the same, added column by column; 0 between calls
-  std::vector<simd::Rows> group_rows;      // [LODs, groups]: the sums of each group
+  std::vector<simd::Rows> group_rows;      // [LODs, groups]: the group's range of rows in sums
   std::vector<std::uint64_t> live_blocks;  // a bit for each block that an active group writes
   std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
   std::size_t live_count = 0;              // first live_count entries are valid
-  // The live_blocks of the frame before, if the pose belongs to an Instance: nothing else writes to
-  // it, so that all other blocks are 0 already. Empty: the content of the pose is unknown.
+  // The live_blocks of the frame before, if the pose belongs to an Instance in which only joint
+  // groups write joint attributes: all other blocks of the pose are then 0 already. Empty: the
+  // content of the pose is unknown.
   std::vector<std::uint64_t> shown_blocks;
   // Rotations by quaternions.
-  std::vector<std::uint16_t> straight_joints;  // joints that no Euler angles turn at any LOD
-  std::vector<Quaternion> products;            // [quaternion joints]
-  std::vector<std::uint64_t> quaternion_bits;  // a bit for each active column; 0 between calls
+  // If poses have quaternions: the joints that no Euler angles turn at any LOD.
+  std::vector<std::uint16_t> straight_joints;
+  std::vector<Quaternion> products;  // [quaternion joints]
+  // A bit for each of quaternion_columns whose control is not 0; all are 0 between calls.
+  std::vector<std::uint64_t> quaternion_bits;
   // Solvers and networks.
-  std::vector<double> solver;  // the inputs of a solver, then two values for each of its poses
-  std::vector<float> masks;    // [regions]: 0 skips the region's networks
+  // The inputs of a solver, then the kernel values of its poses, then the weights of its poses.
+  std::vector<double> solver;
+  std::vector<float> masks;                     // [regions]: 0 skips the region's networks
   core::AlignedVector<float> operation_values;  // results of operations
-  core::AlignedVector<float> layers[2];         // input and output of a network layer
+  core::AlignedVector<float> layers[2];         // input and output of a layer, each with a last 1
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // Memory of evaluate_frames, which evaluates kFrames frames together.
   std::vector<std::uint64_t> union_bits;  // a bit for each control that is not 0 in some frame
-  // [controls, kFrames]: values of the controls. Correctives and networks are 0 between two calls.
+  // [controls, kFrames]: values of the controls. All are 0 between two calls.
   core::AlignedVector<float> frame_weights;
 };
 
-/// Make a pose and a workspace of the sizes that the rig needs.
+/// Make a pose and a workspace of the sizes that the rig needs. All values of the pose are 0; all
+/// masks of the workspace are 1.
 Pose make_pose(const Rig& rig);
 Workspace make_workspace(const Rig& rig);
 /// A workspace for evaluate_frames; evaluate can use it too.

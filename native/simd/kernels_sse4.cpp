@@ -19,7 +19,8 @@ namespace risorius::simd {
 
 namespace {
 
-// Converts four rotations together. The number after each rotation is read and written with it.
+// Like OneByOne of rotations_body.h, but copies four rotations together. split also reads the float
+// after the three angles, where join writes w.
 struct FourByFour {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
                                     Turns (&angles)[3]) {
@@ -39,7 +40,8 @@ struct FourByFour {
       for (std::size_t i = 0; i < 4; ++i) _mm_storeu_ps(rotations + at[l + i], r[i]);
     }
   }
-  // Like OneByOne::any_beyond, but one instruction combines the sign bits.
+  // Whether an angle exceeds a positive limit (given by its bits), or is infinite or NaN, as in
+  // OneByOne::any_beyond, but one instruction collects the sign bits of all lanes.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m128i most = _mm_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm_set1_epi32(0x7FFFFFFF);

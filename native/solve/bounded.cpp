@@ -8,9 +8,9 @@ namespace risorius::solve {
 
 namespace {
 
-/// Solves m x = b for a symmetric positive definite m [n, n], which is overwritten. A direction
-/// whose pivot is 0 or, by rounding, negative gets the value 0. In: x  the right side b. Out: x
-/// the solution
+/// Solves m x = b for a symmetric positive definite m [n, n], of which only the lower triangle is
+/// read, and which is overwritten. An unknown whose pivot is 0 or, by rounding, negative gets the
+/// value 0. In: x  the right side b. Out: x  the solution
 void solve_symmetric(std::size_t n, double* m, double* x) {
   for (std::size_t j = 0; j < n; ++j) {
     double* row = m + j * n;
@@ -71,7 +71,7 @@ struct Dual {
     }
     return sum;
   }
-  /// A Newton step at the point where image() gave x and slope.
+  /// A Newton step, the change of y, at the y for which image() gave x and slope.
   std::vector<double> step(const double* x, const std::vector<double>& slope) const {
     std::vector<double> m(rows * rows), out(rows);
     for (std::size_t c = 0; c < columns; ++c) {

@@ -53,7 +53,7 @@ class Work {
 
  private:
   struct Mesh {
-    std::size_t face, target, first;  // first of its blocks
+    std::size_t face, target, first;  // first: number of its first block among all blocks
   };
 
   void begin(std::size_t f) noexcept {

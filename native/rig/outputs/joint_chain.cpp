@@ -54,7 +54,8 @@ bool invert(const Affine& m, Affine& out) {
 
 std::string bone_name(std::size_t bone) { return "bone " + std::to_string(bone); }
 
-// Sorts parents before their children. Fails: see make_joint_chain
+// Sorts parents before their children. Fails: kInvalidIndex (a parent that does not exist, or a
+// cycle of parents)
 Result<std::vector<std::uint32_t>> sorted(std::span<const std::int32_t> parents) {
   const std::size_t n = parents.size();
   std::vector<std::uint32_t> order;

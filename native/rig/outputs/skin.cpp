@@ -62,7 +62,8 @@ Status check_influences(const Lists& lists, std::uint32_t vertex_count, std::uin
   return core::ok();
 }
 
-// The sum of a vertex's weights, by which they are divided; 0 if the vertex does not move.
+// The sum of a vertex's weights, by which they are divided; 0 if the vertex does not move because
+// the sum is too small or infinite.
 float divisor(std::span<const float> weights) {
   const float sum = std::accumulate(weights.begin(), weights.end(), 0.0f);
   return sum > kLeastWeight && std::isfinite(sum) ? sum : 0.0f;
@@ -97,8 +98,9 @@ void put_vertex(const Lists& lists, std::size_t v, std::size_t at, std::size_t p
 }
 
 // Adds a run: vertices of a block with the same number of influences, rounded up to fours.
-// In: begin  first vertex of the block
-//     fours  number of groups of four influences of each vertex
+// In: begin     first vertex of the block
+//     vertices  the vertices of the run, relative to begin
+//     fours     number of groups of four influences of each vertex
 void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_t> vertices,
              std::uint32_t fours, Skin& skin) {
   skin.runs.push_back({static_cast<std::uint32_t>(vertices.size()), fours});
@@ -113,7 +115,8 @@ void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_
   }
 }
 
-// Adds a block with the vertices [begin, end), sorted by number of influences and then by index.
+// Adds a block with the vertices [begin, end), sorted by number of influences, rounded up to fours,
+// and then by index.
 void add_block(const Lists& lists, std::uint32_t begin, std::uint32_t end, Skin& skin) {
   std::vector<std::uint32_t> fours;
   for (std::uint32_t v = begin; v < end; ++v) fours.push_back(fours_of(weights_of(lists, v)));

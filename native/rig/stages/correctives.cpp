@@ -46,12 +46,12 @@ bool rests_any(const Rig& rig, const Psd& psd, auto rests) noexcept {
   return std::any_of(factors, factors + psd.factor_count, rests);
 }
 
-// Lists the watched correctives that may not be 0: their watcher and their second factor are not 0.
-// If the next evaluation has the same active controls, it also removes correctives with any factor
-// at 0 from the list; for a single evaluation this test takes longer than it saves.
+// Lists the watched correctives that may not be 0: their watcher and Watch::other are not 0. If the
+// evaluation before had the same active controls, its list is used again, and correctives with any
+// factor at 0 are removed from it; for a single evaluation this test takes longer than it saves.
 // In:  kept    the evaluation before had the same active controls
 //      rests   rests(control): whether a control is 0
-// Out: work    firing
+// Out: work    firing, firing_count, fires_all
 template <class Rests>
 void list_firing(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                  bool kept, Workspace& work, Rests rests) noexcept {
@@ -228,8 +228,10 @@ bool any_negative_0(const float* values, std::size_t count) noexcept {
   return std::any_of(values, values + count, [](float v) { return v == 0.0f && std::signbit(v); });
 }
 
-// Lists the raw controls that are not 0 in at least one frame.
-// Out: signs  whether any value has its sign bit set
+// Lists in work.active the raw controls that are not 0 in at least one frame of work.frame_weights,
+// and sets their bits in work.union_bits.
+// Out: signs    whether any value has its sign bit set
+//      returns  the number of listed controls
 std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   const float* values = work.frame_weights.data();
   std::uint64_t all = 0;
@@ -247,7 +249,8 @@ std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
 }
 
 // Computes a corrective of four frames. Products and roundings have the same order as in
-// corrective().
+// corrective(). The result is 0 instead of NaN in frames in which a factor is 0.
+// In: values  [controls, kFrames], from the first of the four frames on
 simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
                             const float* values) noexcept {
   simd::Four product = simd::Four::all(psd.weight);
@@ -268,7 +271,8 @@ simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
 
 // Computes the listed correctives of all frames.
 // In/out: values  [controls, kFrames] all controls, frame after frame for each control
-//         bits    a bit for each corrective that is not 0 in some frame
+//         bits    [controls] bits: the bit of a corrective's output is set if the corrective is not
+//                 0 in some frame
 void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, float* values,
                        std::uint64_t* bits) noexcept {
   for (const std::uint16_t p : firing) {
@@ -284,8 +288,9 @@ void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, fl
   }
 }
 
-// Writes the controls of each frame: its raw controls, and the others from work. Out: controls
-// [count, controls]
+// Writes the controls of each frame: its raw controls, the active correctives from
+// work.frame_weights, 0 for the other correctives, and the initial values of all other controls.
+// Out: controls  [count, controls]
 void write_frames(const Rig& rig, const float* raw, std::size_t count, const Workspace& work,
                   float* controls) noexcept {
   const std::uint32_t correctives_end = rig.raw_count + rig.psd_count;

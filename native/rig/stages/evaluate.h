@@ -9,12 +9,13 @@
 
 namespace risorius::rig {
 
-/// Turns raw controls into a pose. Allocates nothing.
+/// Turns raw controls into a pose. Allocates nothing. A face without LODs stays at rest.
 /// In:   raw     float32[R], any values. Outside [0, 1] joints and blend shapes extrapolate,
 ///               correctives clamp their factors, and maps are 0 outside of their intervals. NaN or
 ///               infinity makes these outputs invalid: rows of joint groups that have the control
-///               as a column, its shapes, maps, networks and setups, and the correctives whose
-///               other factors are not 0. check_finite finds such values
+///               as a column, its shapes, maps, networks and setups, and the correctives that
+///               have the control as a factor, unless another factor is 0. check_finite finds such
+///               values
 ///       lod     clamped to the last LOD
 ///       settle  true: networks, solvers and correctives run in the order of their dependencies, so
 ///               that the pose is a function of raw alone; false: networks, then solvers, then

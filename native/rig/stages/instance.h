@@ -17,12 +17,13 @@ class Instance {
  public:
   explicit Instance(const Rig& rig);
   std::uint32_t lod() const { return lod_; }
-  /// Changes the LOD, clamped to the last one. Another LOD resets all controls except the raw ones
-  /// to their initial values, as in the reference evaluator.
+  /// Changes the LOD, clamped to the last one. Another LOD, or any LOD beyond the last one, resets
+  /// the pose to rest and all controls except the raw ones to their initial values, as in the
+  /// reference evaluator.
   void set_lod(std::uint32_t lod) noexcept;
   const Pose& evaluate(const float* raw) noexcept;
   /// One value for each region, mesh after mesh. At 0 the networks of the region are skipped and
-  /// their outputs keep their initial values. Other values have no effect.
+  /// their outputs are 0, or 1 for the w of a joint's quaternion. Other values have no effect.
   std::span<const float> masks() const { return work_.masks; }
   /// In: index below the number of masks.
   void set_mask(std::size_t index, float value) noexcept;

@@ -267,8 +267,8 @@ class Placer {
   }
 
  private:
-  // The end of the extra pieces of earlier blocks. The search begins at the result of the last
-  // call, with steps that double.
+  // The first extra piece whose block is not before `block`. The search begins at the result of the
+  // last call, with steps that double.
   const simd::Piece* extra_before(std::size_t block) noexcept {
     std::ptrdiff_t step = 1;
     const simd::Piece* from = extra_;

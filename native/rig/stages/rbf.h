@@ -13,7 +13,8 @@ namespace risorius::rig {
 enum RbfDistance : std::uint32_t { kEuclidean, kQuaternion, kSwingAngle, kTwistAngle };
 
 /// For the distances of swing or twist angles: reduces each quaternion (x y z w) of values to its
-/// swing or twist about the axis, in place. For other distances: does nothing.
+/// swing or twist about the axis (0 x, 1 y, 2 z), in place. For other distances: does nothing.
+/// In: values  [count], one quaternion after the other
 void convert_rbf_inputs(std::uint32_t distance, std::uint32_t axis, double* values,
                         std::size_t count) noexcept;
 /// The distance between two inputs that convert_rbf_inputs has converted: the length of their

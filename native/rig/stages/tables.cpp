@@ -53,7 +53,8 @@ bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
          active * kNamed + run * sizeof(float) < (shapes - run) * kLooked;
 }
 
-// Calls f(channel) for each channel of a control at the LOD.
+// Calls f(channel) for each channel of a control at the LOD. In: shapes  number of channels at the
+// LOD
 template <class F>
 void for_channels(const Rig& rig, std::uint32_t shapes, std::uint16_t control, F f) noexcept {
   const std::uint32_t end = rig.shape_begins[control + std::size_t{1}];

@@ -12,11 +12,11 @@ namespace risorius::rig {
 void gui_to_raw(const Rig& rig, const float* gui, float* raw) noexcept;
 
 /// Computes GUI controls from raw controls by inverting the rows of the table. The rows of a GUI
-/// control with equal bounds form a range. For each GUI control the range wins in which most raw
-/// controls other than 0 have an inverse inside the bounds. If several ranges have as many, the
-/// first of them wins. The first row of this range with an inverse inside the bounds gives the
-/// value, even if its raw control is 0. If no range has such a raw control other than 0, the GUI
-/// control is 0.
+/// control with equal bounds form a range. A row has an inverse if the input that gives the value
+/// of its raw control is inside the bounds. For each GUI control the range with the most rows that
+/// have an inverse and a raw control other than 0 wins; among equal ranges the first one wins. The
+/// first row of this range with an inverse gives the value, even if its raw control is 0. If no
+/// range has a row with an inverse and a raw control other than 0, the GUI control is 0.
 /// In: raw float32[raw controls]. Out: gui float32[GUI controls].
 void raw_to_gui(const Rig& rig, const float* raw, float* gui) noexcept;
 
