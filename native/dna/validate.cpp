@@ -536,7 +536,7 @@ void check_setups(Checker& c, const Where& name, const List<TwistSwingSetup>& se
 void check_layers(Checker& c, const Dna& dna, bool geometry) {
   check_descriptor(c, dna);
   check_definition(c, dna);
-  // Without a definition (a descriptor-only load) there are no sizes to check indices against.
+  // An empty behavior has nothing to check; it is empty if it was not loaded.
   if (dna.behavior != Behavior{}) check_behavior(c, dna);
   if (geometry) check_geometry(c, dna);
   check_networks(c, dna);

@@ -33,9 +33,9 @@ class Places {
     const auto at = fields_.lower_bound(where);
     if (at != fields_.end() && at->starts_with(where)) places_.insert({where, place});
   }
-  /// The byte offset in the file of the value that `where` names, in the form of validate's errors;
-  /// if the value has no recorded place, the offset of the smallest recorded struct or list around
-  /// it, or nullopt.
+  /// The byte offset in the file of the value that `where` names, such as
+  /// "geometry.meshes[3].positions[7]"; if the value has no recorded place, the offset of the
+  /// smallest recorded struct or list around it; nullopt if there is none.
   std::optional<std::uint64_t> find(std::string where) const;
 
  private:

@@ -14,7 +14,7 @@ namespace risorius::dna::detail {
 
 class LayerWriter {
  public:
-  bool mesh_sizes = true;  // as in LayerReader
+  bool mesh_sizes = true;  // 2.2+: a mesh is preceded by its size; 2.1: by the offset of its end
 
   explicit LayerWriter(bytes::ByteWriter& writer) : w_(writer) {}
 

@@ -170,8 +170,8 @@ void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
   }
 }
 
-// The face without the layers and controls that this version cannot store, or nullopt if the whole
-// face can be stored.
+// The face without the layers that this version cannot store, without their controls and without
+// unread controls, or nullopt if nothing has to be left out.
 // In: kept  true: layers that the version does not know are written nevertheless
 Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
                                    std::vector<Warning>& warnings) {
