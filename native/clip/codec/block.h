@@ -67,8 +67,8 @@ class EncodedCurves {
   struct Pending;
   struct Part {
     enum Kind : std::uint8_t { kConstant, kCoded, kStored } kind = kConstant;
-    bool is_near_end = false;          // its bytes lie in tail_
-    std::uint32_t bits = 0;            // of kConstant
+    bool is_near_end = false;          // its bytes are read from tail_
+    std::uint32_t bits = 0;            // of kConstant: the bits of the float
     std::size_t offset = 0, size = 0;  // of the bytes of the other kinds
   };
   EncodedCurves();
@@ -83,7 +83,7 @@ class EncodedCurves {
   std::size_t frames_ = 0;
   std::vector<Part> parts_;
   std::unique_ptr<Tables> tables_;
-  Bytes tail_;  // a copy of the bytes from tail_begin_ on
+  Bytes tail_;  // a copy of the bytes from tail_begin_ on, and spare bytes after them
   std::size_t tail_begin_ = 0;
 };
 

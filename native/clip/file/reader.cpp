@@ -174,8 +174,8 @@ core::Status Reader::read_index() {
   return read_blocks(View(*bytes).first(length), offset);
 }
 
-// Reads the table of blocks and the events. In: index  the index's bytes; offset  their place in
-// the file
+// Reads the table of blocks and the events. In: index  the index's bytes; offset  their byte offset
+// in the file
 core::Status Reader::read_blocks(View index, std::uint64_t offset) {
   Cursor in(index);
   const auto refuse = [&](ErrorCode code, std::string message) {

@@ -27,8 +27,8 @@ struct LodSelection {
 /// RBF solvers that no kept LOD uses are removed, and all indices are renumbered (the reference
 /// library keeps the numbers of channels, maps and networks). Joints that LOD 0 does not list are
 /// kept, as in the reference library, and so are the ancestors of every kept joint, so that no
-/// joint moves. A selection of all LODs changes nothing. Fails: kInvalidArgument (the file has none
-/// of the selected LODs), kInvalidIndex, and as validate
+/// joint moves. A selection of all LODs changes nothing.
+/// Fails: kInvalidArgument (the file has none of the selected LODs), kInvalidIndex, and as validate
 core::Result<Dna> filter_lods(const Dna& dna, const LodSelection& selection);
 
 /// A copy without the blend shape channels that no LOD lists, and without the channels driven by a
@@ -71,8 +71,8 @@ void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehavio
                                 std::vector<bool>& keep);
 
 /// Reduces a joint group's lods to the kept LODs, and output_indices to the leading rows that a
-/// kept LOD uses. Joints are neither dropped nor renumbered. Out: number of leading rows that
-/// remain; the caller cuts the values
+/// kept LOD uses. Joints are neither dropped nor renumbered.
+/// Out: number of leading rows that remain; the caller cuts the values
 std::size_t cut_rows(const LodPlan& plan, JointGroup& group);
 
 /// Renumbers a vertex's joints. Influences of dropped joints are removed, and the other weights are

@@ -24,9 +24,8 @@ core::Result<std::string> to_json(const Dna& dna);
 /// "size" and "offset" are ignored; any other unknown member is an error. Allocates at most about
 /// 64 times the size of the text.
 /// Fails: kNotDna (not JSON, with the byte offset), kInvalidValue (a member that is missing,
-/// repeated, of
-///        another type or out of range, with its path), kUnsupportedGeneration (a generation other
-///        than 2), kLimitExceeded, and as validate
+///        repeated, of another type or out of range, with its path), kUnsupportedGeneration (a
+///        generation other than 2), kLimitExceeded, and as validate
 core::Result<Dna> from_json(std::string_view text, const Limits& limits = {});
 
 }  // namespace risorius::dna
