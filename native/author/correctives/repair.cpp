@@ -309,9 +309,11 @@ struct Best {
   }
 };
 
-/// Undoes a part of the pose near the pose's faults, more in each round, until no fault is left.
-/// In: undo   [V] the displacement in mm that undoes the part everywhere
-///     reach  mm: vertices at least this far from every fault keep their whole motion
+/// Undoes a part of the pose near the pose's faults, more in each round, until no fault is left or
+/// kFades rounds are done.
+/// In:     undo   [V] the displacement in mm that undoes the part everywhere
+///         reach  mm: vertices at least this far from every fault keep their whole motion
+/// In/out: best   gets the displacement of a round that is cheaper
 void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {
   const auto& neutral = work.topology.neutral;
   std::map<std::uint32_t, double> seeds;

@@ -150,8 +150,9 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
   }
 }
 
-/// Finds contacts of the skin with itself: upper and lower lip, upper and lower lid. A vertex that
-/// lies behind the other surface in the neutral pose is left out, because the skin is thin there.
+/// Finds contacts of the skin with itself: upper and lower lip, upper and lower lid. A triangle
+/// behind which the vertex lies in the neutral pose already is left out, because the skin is thin
+/// there.
 void touch_skin(const Topology& topology, const Region& region, const std::vector<Vec3>& skin,
                 std::vector<Contact>& best) {
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);

@@ -29,7 +29,7 @@ struct Topology {
   Skin skin;
   std::vector<Vec3> neutral;           // [V] mm
   std::vector<Triangle> triangles;     // fans of the faces
-  std::vector<std::uint32_t> face_of;  // [triangles]
+  std::vector<std::uint32_t> face_of;  // [triangles] index of the face of a triangle
   std::vector<Hinge> hinges;           // inner edges
   std::vector<double> face_areas;      // [F] mm2, neutral
   std::vector<double> vertex_areas;    // [V] mm2, neutral
@@ -50,9 +50,9 @@ struct Contact {
   std::uint32_t vertex = 0;
   float depth = 0.0f;  // mm
   Vec3 normal = Vec3::Zero();
-  bool is_skin = false;
-  Triangle other{};  // of the skin, if is_skin
-  Vec3 share = Vec3::Zero();
+  bool is_skin = false;       // inside the skin, not inside a solid
+  Triangle other{};           // if is_skin: vertices of the touched triangle of the skin
+  Vec3 share = Vec3::Zero();  // if is_skin: barycentric coordinates of the touched point
 };
 
 /// The positions of a skin and its solids in one pose, in mm.

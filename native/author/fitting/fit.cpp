@@ -51,7 +51,8 @@ std::vector<double> worst_squares(const Problem& problem, const std::vector<floa
   return out;
 }
 
-/// Raises the importance of vertices whose largest error is above average.
+/// Raises the importance of vertices whose largest error is above average, and lowers the others'.
+/// In: power  FitOptions::emphasis; 0: importance stays as it is
 void emphasise(Problem& problem, const std::vector<float>& left, double power) {
   if (power <= 0.0) return;
   std::vector<double> worst = worst_squares(problem, left);

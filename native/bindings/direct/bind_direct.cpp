@@ -195,7 +195,7 @@ struct Request {
     rig::evaluate_faces(all, frames, threads);
   }
 
-  // The numbers of the meshes whose vertices the evaluation wrote.
+  // The indices of the meshes of face f whose vertices the evaluation wrote.
   py::tuple written(std::size_t f) const {
     py::list meshes;
     for (const rig::Target& t : frames[f].targets) {

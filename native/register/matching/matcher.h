@@ -21,9 +21,10 @@ struct Target {
 /// Properties of the template's vertices at the start of the registration. They stay constant while
 /// the vertices move.
 struct Looks {
-  std::vector<Bend> bends;           // [V]
-  std::vector<double> belief;        // [V] 0: has no counterpart, 1: has one
-  std::vector<double> inside;        // [V] 1: hidden in a cavity, which the target may also have
+  std::vector<Bend> bends;     // [V]
+  std::vector<double> belief;  // [V] 0: has no counterpart, 1: has one; between: uncertain
+  // [V] 1: hidden in a cavity, which the target may also have; all 0 if the caller gave `trusted`
+  std::vector<double> inside;
   std::vector<std::uint8_t> border;  // [V] not 0: on the border of the template
   std::vector<RimEdge> rim;          // the edges of that border
 };
