@@ -28,6 +28,8 @@ COUNT = 100
 Item = tuple[str, str, str, str]  # place, context, name of the described thing, text
 Described = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 _DESCRIBED = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+_NOT_DECLARED = re.compile(r"\s*(\}|if|for|while|else|switch|case|do|try|namespace|extern)\b")
+_CONTINUES = re.compile(r"[^;{}:]$")  # a line of C++ whose statement goes on in the next line
 _NOT_PROSE = re.compile(r"SPDX|noqa|type:|NOLINT|clang-format|-{4}")
 
 
@@ -87,10 +89,67 @@ def around(nodes: list[Described], number: int, lines: list[str]) -> str:
 
 
 def cpp_comments(path: Path) -> Iterator[Item]:
-    """Comment blocks of a C++ file; the first one is the context of the others."""
-    found = list(blocks(path, path.read_text(encoding="utf-8").splitlines(), "", "//"))
+    """Comment blocks of a C++ file; one about the file is part of the context of the others."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    found = list(blocks(path, lines, "", "//"))
+    of_file = [text for _, _, name, text in found[:1] if not name or name.startswith("#")]
     for place, _, name, text in found:
-        yield place, "" if text == found[0][3] else one_line(found[0][3]), name, text
+        about = "".join(one_line(first) for first in of_file if first != text)
+        number = int(place.rpartition(":")[2])
+        code = next((k for k in range(number, len(lines)) if lines[k].strip() == name), None)
+        shown = name if code is None else declaration(lines, code)
+        yield place, about + cpp_around(lines, number), shown, text
+
+
+def declaration(lines: list[str], number: int) -> str:
+    """The code from a line to the end of its brackets, at most eight lines, as one line.
+
+    Args:
+        lines: lines of a C++ file.
+        number: index of the first line.
+    """
+    out = ""
+    for line in lines[number : number + 8]:
+        out += " " + line.partition(" //")[0]
+        if out.count("(") <= out.count(")"):
+            break
+    return one_line(out)
+
+
+def cpp_around(lines: list[str], number: int) -> str:
+    """Classes and functions around a line of C++: declaration and first sentence of the comment.
+
+    Args:
+        lines: lines of the file, with the indentation of clang-format.
+        number: number of the line, from 1.
+    """
+    out, indent = "", _indent(lines[number - 1])
+    for k in range(number - 2, -1, -1):
+        line = lines[k]
+        if not line.strip() or _indent(line) >= indent or line.startswith("#"):
+            continue
+        indent = _indent(line)
+        if not line.endswith("{") or _NOT_DECLARED.match(line):
+            continue
+        first = k
+        while first and _goes_on(lines[first - 1], indent):
+            first -= 1
+        above = first
+        while above and lines[above - 1].strip().startswith("//"):
+            above -= 1
+        said = one_line(" ".join(part.strip().lstrip("/! ") for part in lines[above:first]))
+        shown = one_line(" ".join(lines[first : k + 1]))
+        out = f" | inside: {shown} {said.partition('. ')[0]}{out}"
+    return out
+
+
+def _goes_on(line: str, indent: int) -> bool:
+    """Whether a line with this indentation is the begin of a declaration that continues."""
+    return _indent(line) == indent and bool(_CONTINUES.search(line)) and "//" not in line
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
 
 
 def blocks(path: Path, lines: list[str], about: str, mark: str) -> Iterator[Item]:
