@@ -27,8 +27,9 @@ risorius_status refuse(std::string_view argument, std::string_view message) noex
 risorius_status out_of_memory() noexcept;
 risorius_status internal() noexcept;
 
-/// Runs body, which returns a status, and turns an exception or a lack of memory into a status.
-/// WebAssembly is built without exceptions: there a lack of memory ends the program.
+/// Runs body, which returns a status. An exception, such as a lack of memory, becomes a status and
+/// the last error of this thread. WebAssembly is built without exceptions: there a lack of memory
+/// ends the program.
 template <class Body>
 risorius_status guarded(const Body& body) noexcept {
 #ifdef __cpp_exceptions

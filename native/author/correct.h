@@ -68,7 +68,8 @@ class SkinChecker {
   static constexpr double kAround = 10.0;  // mm around a fault in which vertices may move
 
   /// Checks a skin and prepares it for the search for faults.
-  /// Fails: kInvalidIndex (a corner), kInvalidLength (offsets), kInvalidValue (not finite)
+  /// Fails: kInvalidIndex (a vertex of a corner or of a solid's triangle), kInvalidLength (offsets,
+  ///        no face), kInvalidValue (`neutral` or `mm`)
   static core::Result<SkinChecker> make(Skin skin);
   ~SkinChecker();
   SkinChecker(SkinChecker&&) noexcept;
@@ -82,9 +83,9 @@ class SkinChecker {
   };
   /// The nearest points of the neutral skin.
   /// In: points   in the skin's unit
-  ///     normals  of the points: only triangles with a similar normal are searched, so that the
-  ///              upper lip is not mistaken for the lower one; all triangles are searched if none
-  ///              has a similar normal, or if `normals` is empty
+  ///     normals  of the points: only triangles with a similar normal (cosine above 0.3) are
+  ///              searched, so that the upper lip is not mistaken for the lower one; all triangles
+  ///              are searched if none has a similar normal, or if `normals` is empty
   /// Fails: kInvalidValue (not finite), kInvalidLength (normals)
   core::Result<std::vector<Place>> nearest(const std::vector<Vector3>& points,
                                            const std::vector<Vector3>& normals = {}) const;

@@ -288,7 +288,8 @@ void bind_fits(py::module_& m) {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The value that belongs to a name. Raises ValueError if the name is unknown.
+/// The enumerator that a name such as "TRIANGLES" stands for. Raises ValueError for a name that is
+/// not in `known`. In: what  name of the argument, for the error
 template <class T, std::size_t kCount>
 T named(const char* what, const std::string& name,
         const std::array<std::pair<const char*, T>, kCount>& known) {

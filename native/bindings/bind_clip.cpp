@@ -137,7 +137,7 @@ class ClipFile {
   std::mutex mutex_;
 };
 
-// A writer for Python. A mutex lets one thread append frames at a time.
+// A writer of a clip file for Python. A mutex lets only one thread use it at a time.
 class ClipFileWriter {
   template <class What>
   auto locked(What&& what) {

@@ -26,7 +26,8 @@ void throw_error(const core::Error& error, const std::string& file = "", PyObjec
 /// release it.
 PyObject* new_error_type(const char* name, const char* doc);
 
-/// Returns the value of a result, or raises its error. In: file  as in throw_error
+/// Returns the value of a result, or raises its error as a risorius.DnaError. In: file  the file
+/// that the error is about, or ""
 template <class T>
 T unwrap(core::Result<T>&& result, const std::string& file = "") {
   if (!result) throw_error(result.error(), file);

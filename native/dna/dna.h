@@ -251,7 +251,7 @@ struct JointRepresentation {
   bool operator==(const JointRepresentation&) const = default;
 };
 
-/// Layer jbmd: one entry per joint.
+/// Layer jbmd: the representation of each joint's translation, rotation and scale.
 struct JointBehaviorMetadata {
   List<JointRepresentation> joint_representations;
   bool operator==(const JointBehaviorMetadata&) const = default;

@@ -110,7 +110,8 @@ class Checker {
   struct Odd {
     std::size_t first = 0, count = 0;
   };
-  /// The first index below size for which is_odd is true, and how many there are.
+  /// The first index below `size` for which is_odd is true (0 if there is none), and the number of
+  /// such indices.
   template <class IsOdd>
   static Odd find_odd(std::size_t size, const IsOdd& is_odd) {
     Odd out;

@@ -99,8 +99,8 @@ Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const 
 std::uint64_t remove_outliers(const dna::Dna& dna, const Regions& regions, const Effects& effects,
                               double foreign_share, std::vector<Unit>& units);
 
-/// Removes rows that are all 0, except the last row of a joint, and except rows of quaternion
-/// joints and of joints where several units write one output. Call it after find_layers.
+/// Removes rows that are all 0, except at quaternion joints and at joints where several units write
+/// one output. Of each joint at least one row stays. Call it after find_layers.
 void remove_zero_rows(std::vector<Unit>& units);
 
 /// Builds the dense joint groups of all regions from the units. Fails: kLimitExceeded (a group that

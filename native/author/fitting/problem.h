@@ -62,7 +62,7 @@ struct Joint {
   std::vector<Mat3> rotations;     // [E]
   std::vector<Vec3> translations;  // [E]
   std::vector<Affine> motions;     // [E] computed from the two above
-  // [E] the joint takes no part in the expression; empty: it takes part in all.
+  // [E] true: the joint takes no part in the expression; empty: it takes part in all.
   std::vector<bool> idle;
 
   bool is_idle(std::size_t expression) const { return !idle.empty() && idle[expression]; }

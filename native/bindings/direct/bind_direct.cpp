@@ -109,7 +109,8 @@ float* target_argument(const py::handle& value, py::ssize_t vertices,
   return reinterpret_cast<float*>(address);
 }
 
-/// The arguments of evaluate_faces, and the Python objects that keep their memory alive.
+/// The arguments of evaluate_faces or deform_faces, and the Python objects that keep their memory
+/// alive.
 struct Request {
   std::vector<FacePtr> faces;
   std::vector<rig::FaceFrame> frames;

@@ -60,7 +60,8 @@ class Reader {
                     float* out, double* out_times);
 
   /// Writes the values of the controls that a block describes as constant to `values` [controls],
-  /// and appends the numbers of the other controls to `moving`. Fails: as read.
+  /// and appends the indices of the other controls to `moving`.
+  /// Fails: kInvalidValue, kInvalidLength, kTruncated
   core::Status resting(std::size_t block, std::span<float> values,
                        std::vector<std::uint32_t>& moving);
 
@@ -91,7 +92,7 @@ class Reader {
   std::shared_ptr<Loaded> loaded_;
 };
 
-/// Decodes a whole file. Fails: as Reader.
+/// Decodes a whole .rzc file. Fails: as Reader::open and Reader::read
 core::Result<Clip> decode(View bytes, Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
 
 }  // namespace risorius::clip

@@ -174,7 +174,8 @@ class Mixer {
   /// Replaces the reactions and stops the fired ones.
   /// Fails: kInvalidIndex, kInvalidLength, kInvalidValue.
   core::Status set_reactions(std::vector<Reaction> reactions);
-  /// Replaces the rules of controls that exclude each other. In: controls of the mixer
+  /// Replaces the rules of controls that exclude each other. In: yields, opposites  their controls
+  /// are indices below control_count()
   /// Fails: kInvalidIndex, kInvalidValue.
   core::Status set_rules(std::vector<Yield> yields, std::vector<Opposites> opposites);
 
@@ -187,8 +188,8 @@ class Mixer {
   bool fire(std::size_t reaction, double time, float strength) noexcept;
   void clear_fired() noexcept { voice_count_ = 0; }
 
-  /// Computes the controls at a time. The result depends only on the time, the base and the fired
-  /// reactions.
+  /// Computes the controls at a time. Apart from the layers, reactions and rules that are set, the
+  /// result depends only on the time, the base and the fired reactions.
   /// In:    base  float[controls], or null for 0
   /// Out:   out   float[controls], may be base
   /// Cost:  allocates nothing. Not thread-safe, because it has a workspace

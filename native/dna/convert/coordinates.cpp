@@ -373,7 +373,8 @@ Array<float> converted_quaternions(const Basis& basis, const Array<float>& value
   return out;
 }
 
-// The sign of the axis is ignored, because a twist about the opposite axis is treated alike.
+// Converts the number of a twist axis (0 x 1 y 2 z). The sign of the axis is ignored, because a
+// twist about the opposite axis is treated alike.
 void convert_axis(const Basis& basis, std::uint16_t& axis) {
   if (axis < 3) axis = static_cast<std::uint16_t>(basis.to[axis]);
 }
@@ -417,7 +418,7 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 // ---- networks that move joints
 
 // The numbers of the networks are not converted. Instead, parameters 3 to 9 of MlJoints name the
-// coordinate system to which the numbers refer.
+// coordinate system to which the numbers refer. They stay as they are if all of them are present.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;
   const auto& keys = joints.parameter_keys;

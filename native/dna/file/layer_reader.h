@@ -123,7 +123,8 @@ class LayerReader {
   void faces(Mesh& m);
   void skin(Mesh& m);
   void targets(Mesh& m);
-  /// Records the position of the field that is being read.
+  /// Records the position of the field that is being read. In: at  its byte offset in the file;
+  /// element_size, plane  as in Place
   void note(std::uint64_t at, std::uint32_t element_size = 0, std::uint32_t plane = 0) {
     if (places != nullptr) add_place({at, element_size, plane});
   }

@@ -98,7 +98,9 @@ class Parser {
  private:
   using Body = void (Parser::*)();
 
-  // Reads one layer. Out: false if parsing must stop
+  // Reads one layer, or one section of a 2.1 file, by calling `body`.
+  // In:  offset, size  place of the layer's bytes in the file
+  // Out: false if parsing must stop
   template <class Read>
   bool read(const char* name, std::uint64_t offset, std::uint64_t size, Read body) {
     if (r_.failed() || error_) return false;

@@ -149,8 +149,9 @@ std::vector<std::string> newer_layers(const Dna& dna, std::uint16_t minor) {
   return ids;
 }
 
-// Warns of each layer that the version does not know. In: kept  true: such layers are written
-// nevertheless; false: they are left out
+// Warns of each layer with content that the version does not know, of unknown layers if they are
+// left out, and of a face winding order that the version cannot store. In: kept  true: layers that
+// the version does not know are written nevertheless; false: they are left out
 void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
                     std::vector<Warning>& warnings) {
   const std::string version = "version 2." + std::to_string(options.minor);
