@@ -112,8 +112,7 @@ typedef struct risorius_options {
   const char* const* meshes; /* names of the meshes to read, UTF-8 */
 } risorius_options;
 
-/* The joints in the neutral pose, and the units and axes of the file. If the file has no behavior,
- * joints have no values and stride is 9. */
+/* The joints in the neutral pose, and the units and axes of the file. */
 typedef struct risorius_skeleton {
   uint32_t joint_count;
   uint32_t stride;           /* numbers per joint: 9, or 10 with RISORIUS_QUATERNIONS */
@@ -238,9 +237,10 @@ RISORIUS_API risorius_status risorius_set_lod(risorius_instance* instance, uint3
 /* Computes the pose of the present controls at the present LOD, for risorius_values. */
 RISORIUS_API risorius_status risorius_evaluate(risorius_instance* instance);
 
-/* Values of an instance: controls as set, all others from the last evaluation. Joints are deltas
- * added to neutral, float[joints, stride] (quaternions: multiplied with neutral); a scale of 0
- * means no scaling. Items that the LOD does not use are 0.
+/* Values of an instance: controls as set, all others from the last evaluation, or 0 before the
+ * first one. Joints are deltas added to neutral, float[joints, stride] (quaternions: multiplied
+ * with neutral); a scale of 0 means no scaling. Items that the LOD does not use are 0
+ * (quaternions: 0 0 0 1).
  *
  * In:  list   RISORIUS_RAW_CONTROLS to RISORIUS_MAPS
  *

@@ -96,7 +96,8 @@ struct StartWeights {
 /// Motions of new joints whose weights are known: transfers the rig of one face to another face of
 /// the same topology.
 /// In: shapes   of the other face
-///     options  joints (total), given, pivots, emphasis, least_effect and threads are used
+///     options  joints (total), given (one of them without motions), pivots, emphasis,
+///              least_effect and threads are used
 ///     weights  of all joints, the given ones first, as in a Fit
 ///     at       [new joints] index of the pivot at which a joint is placed; kInTheMiddle: it is
 ///              placed in the middle of its vertices

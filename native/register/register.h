@@ -74,8 +74,8 @@ using Progress = std::function<bool(double)>;
 ///            from the pairs, of which at least three must not lie on a line
 /// Fails: kInvalidArgument (options, too few triangles or pairs, no surface of the target near the
 ///        start; "stopped" if progress returned false), kInvalidLength (start, options),
-///        kInvalidIndex (a corner, a pair's vertex), kInvalidValue (not finite), kLimitExceeded
-///        (vertices)
+///        kInvalidIndex (a corner, a pair's vertex, options.mirrored), kInvalidValue (not finite, a
+///        pair's weight), kLimitExceeded (vertices, triangles)
 /// Cost: about 60 bytes per vertex of the target and 2 kB per vertex of the template
 core::Result<Registered> register_surface(const Mesh& templ, const Mesh& target,
                                           const std::vector<Pair>& pairs,
