@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Reduces the triangles of a mesh with meshoptimizer, then mends slivers: triangles that are
+// almost lines.
 #include "author/simplify.h"
 
 #include <meshoptimizer/meshoptimizer.h>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Binds .rzc clip files: encoding, reading in parts, and recording.
 #include <mutex>
 #include <numeric>
 

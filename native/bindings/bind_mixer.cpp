@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Binds the mixer, which combines layers of curves and reactions to the controls of a frame.
 #include "bindings/numpy_arrays.h"
 #include "clip/mixer/mixer.h"
 

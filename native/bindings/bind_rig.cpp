@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Binds Rig, a compiled face, and its evaluation from raw controls to poses.
 #include <algorithm>
 #include <list>
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Checks the layers of a Dna: errors refuse the file, oddities are warnings.
 #include "dna/validate.h"
 
 #include <algorithm>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Removes from joint groups the small coefficients in columns whose control moves few joints of the
+// region, and rows that are all 0.
 #include <algorithm>
 
 #include "dna/controls.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Finds the triangle that is nearest to a point or that a ray meets, in a tree of boxes.
 #include "author/correctives/nearest.h"
 
 #include <Eigen/Geometry>

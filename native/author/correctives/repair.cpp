@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Repairs a posed skin: finds the displacement of its vertices that removes faults (vertices
+// inside a solid or the skin itself, stretched faces, folded edges) beyond the allowed ones. A
+// pose consists of parts, such as the expressions in it; undoing a part takes its motion back.
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>

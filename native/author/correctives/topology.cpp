@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Prepares a skin for the search for faults, and finds and sums the faults of a pose.
 #include "author/correctives/topology.h"
 
 #include <Eigen/Geometry>

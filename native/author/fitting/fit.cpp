@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Fits joints, weights and joint motions to the expressions of a mesh, in rounds: motions for
+// given weights, then weights for given motions.
 #include "author/fit.h"
 
 #include <Eigen/Geometry>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Converts the shapes, the given joints and the pivots of a fit to the fit's own units.
 #include "author/fitting/prepare.h"
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Private to native/author.
+// The weights of a fit sorted by joint. Private to native/author.
 #pragma once
 
 #include <cstdint>

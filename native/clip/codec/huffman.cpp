@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Computes prefix codes, and writes and reads the lengths of their codes.
 #include "clip/codec/huffman.h"
 
 #include <algorithm>

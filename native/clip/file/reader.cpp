@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reads .rzc files: head and index first, then single blocks of frames.
 #include "clip/file/reader.h"
 
 #include <algorithm>

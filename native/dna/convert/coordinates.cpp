@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Converts a Dna to other axes, rotation order, signs, winding and units, layer by layer. A joint
+// group's rows are joint attributes, its columns controls.
 #include "dna/convert/coordinates.h"
 
 #include <algorithm>

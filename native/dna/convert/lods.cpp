@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Removes the LODs, joints, channels, maps, meshes and networks that a plan drops from a Dna, and
+// renumbers the indices of the others.
 #include "dna/convert/lods.h"
 
 #include <algorithm>

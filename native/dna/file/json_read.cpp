@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reads a Dna from the JSON text that to_json writes.
 #include <bit>
 #include <charconv>
 #include <cmath>

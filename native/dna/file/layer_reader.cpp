@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Reads the fields of DNA layers from bytes. With a plan of the LODs to keep, it skips elements
+// that no kept LOD uses.
 #include "dna/file/layer_reader.h"
 
 #include <algorithm>

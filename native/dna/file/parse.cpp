@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Parses a DNA file: its header, then the layers of the index (2.2 and later) or the sections whose
+// offsets follow the header (2.1).
 #include "dna/file/parse.h"
 
 #include <algorithm>

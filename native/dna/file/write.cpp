@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Writes a Dna as the bytes of a DNA file of version 2.1 to 2.8.
 #include "dna/file/write.h"
 
 #include <algorithm>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Checks the surfaces of a registration, scales them to millimetres, and prepares the search for
+// matches.
 #include "register/steps/prepare.h"
 
 #include <Eigen/Dense>
