@@ -28,8 +28,9 @@ struct Unit {
   bool is_quaternion = false;
   // 0, or more than the layer of each later unit that writes the same output.
   std::uint32_t layer = 0;
-  // 0 if every row is used from LOD 0 on. Units of different chains cannot share a group, because
-  // the sets of LODs that use their rows do not nest in each other.
+  // 0 if every row is used from LOD 0 up to some LOD, or if the unit is in a bundle. Units of
+  // different chains never share a group, because the sets of LODs that use their rows need not
+  // nest in each other.
   std::uint32_t chain = 0;
   std::uint32_t order = kAnyOrder;
   // Units of one bundle form a group without other units; 0: no bundle. If the rotation rows of a
