@@ -76,10 +76,10 @@ void add_networks_of_operations(const LodPlan& plan, const MachineLearnedBehavio
 std::size_t cut_rows(const LodPlan& plan, JointGroup& group);
 
 /// Renumbers a vertex's joints. Influences of dropped joints are removed, and the other weights are
-/// divided by 1 - removed weight, if that weight is above 0 and below 1, so that a sum of 1
-/// stays 1. A vertex that loses all its influences gets the weight 1 for plan.root. In: joints  [n]
-/// below the number of joints of the file Out: number of influences left; finite is set to false if
-/// a weight overflowed
+/// divided by 1 - removed weight (if that weight is between 0 and 1), so that a sum of 1 stays 1. A
+/// vertex that loses all its influences gets the weight 1 for plan.root.
+/// In:  joints  [n] below the number of joints of the file
+/// Out: number of influences left; finite is set to false if a weight overflowed
 std::size_t cut_influences(const LodPlan& plan, float* weights, std::uint16_t* joints,
                            std::size_t n, bool* finite);
 
