@@ -93,9 +93,9 @@ Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const 
                      const RegroupOptions& options, bool significant_only);
 
 /// Removes small coefficients from columns foreign to their region, except at quaternion joints,
-/// and except the last use of a watched corrective at some LOD. In: foreign_share  a column is
-/// foreign if its control moves at most this share of the region's
-///                    joints
+/// and except the last use of a watched corrective at some LOD.
+/// In:  foreign_share  a column is foreign if its control moves at most this share of the region's
+///                     joints
 /// Out: number of removed coefficients
 std::uint64_t remove_outliers(const dna::Dna& dna, const Regions& regions, const Effects& effects,
                               double foreign_share, std::vector<Unit>& units);

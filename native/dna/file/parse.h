@@ -39,8 +39,8 @@ struct ParseOptions {
   Limits limits;
 };
 
-/// Reads a DNA file of generation 2, any minor version (minor versions above 8 by the rules
-/// of 2.8). Fails: kNotDna, kUnsupportedGeneration, kTruncated, kInvalidCount, kInvalidLength,
+/// Reads a DNA file of generation 2, any minor version (2.9 and later by the rules of 2.8).
+/// Fails: kNotDna, kUnsupportedGeneration, kTruncated, kInvalidCount, kInvalidLength,
 ///        kInvalidIndex, kInvalidValue, kLimitExceeded, kIoRead, kInvalidArgument (LODs that do not
 ///        exist), each with the field. The byte offset is missing in kInvalidArgument, and in
 ///        errors of validate if LODs were selected, because indices then count only kept elements
