@@ -26,7 +26,7 @@ struct Surface {
 
 struct Simplified {
   std::vector<Triangle> triangles;  // over the same corners
-  double error = 0.0;               // as a share of the surface's size
+  double error = 0.0;               // distance from the input divided by the input's size
 };
 
 /// A surface with at most `triangles` triangles if possible. Edges are collapsed where that changes

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Binds Rig, a compiled face, and its evaluation from raw controls to poses.
 #include <algorithm>
 #include <list>
 
@@ -95,8 +96,8 @@ std::shared_ptr<const void> keep(const py::buffer& buffer, const void* address) 
 }
 
 // A bytes object is immutable and can be used in place. Any other buffer is copied, even a
-// read-only view, because its owner may still write to it. Bytes that are not aligned to 64 are
-// copied too.
+// read-only view, because its owner may still write to it. Bytes whose address is not a multiple of
+// 64 are copied too.
 std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
                                          const std::optional<std::string>& simd) {
   const py::buffer_info info = buffer.request();

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Rebuilds the joint groups of a face as dense groups of regions of joints.
 #include "edit/regroup.h"
 
 #include <algorithm>

@@ -32,7 +32,7 @@ struct Mesh {
 /// A vertex of the template and the corresponding point of the target.
 struct Pair {
   std::uint32_t vertex = 0;
-  Vector3 point{};
+  Vector3 point{};      // in the target's unit
   double weight = 1.0;  // against other pairs, 0 to 1e6
 };
 
@@ -70,12 +70,12 @@ struct Registered {
 using Progress = std::function<bool(double)>;
 
 /// Registers a template onto a target.
-/// In: start  [template vertices] positions near the target; empty: computed from the pairs, of
-///            which at least three must not lie on a line
+/// In: start  [template vertices] positions near the target, in the target's unit; empty: computed
+///            from the pairs, of which at least three must not lie on a line
 /// Fails: kInvalidArgument (options, too few triangles or pairs, no surface of the target near the
 ///        start; "stopped" if progress returned false), kInvalidLength (start, options),
-///        kInvalidIndex (a corner, a pair's vertex), kInvalidValue (not finite), kLimitExceeded
-///        (vertices)
+///        kInvalidIndex (a corner, a pair's vertex, options.mirrored), kInvalidValue (not finite, a
+///        pair's weight), kLimitExceeded (vertices, triangles)
 /// Cost: about 60 bytes per vertex of the target and 2 kB per vertex of the template
 core::Result<Registered> register_surface(const Mesh& templ, const Mesh& target,
                                           const std::vector<Pair>& pairs,

@@ -41,7 +41,8 @@ void encode_curves(const BlockCurves& curves, Bytes& out);
 /// The curves of a block. A curve is decoded only when it is requested.
 class EncodedCurves {
  public:
-  /// Reads the table of parts. bytes must outlive the result.
+  /// Reads the prefix codes of a block and the kind of each curve, but decodes no curve.
+  /// In:    bytes  the result of encode_curves; they must outlive the result
   /// Fails: kInvalidValue, kInvalidLength; the error's offset counts from the first of the bytes
   static core::Result<EncodedCurves> open(View bytes, std::size_t controls, std::size_t frames);
 
@@ -51,7 +52,8 @@ class EncodedCurves {
 
   /// Writes the frames of controls to out [controls.size(), frames]; rows are `stride` values
   /// apart.
-  /// Fails: kInvalidValue. In: controls of this block
+  /// In:    controls  indices of controls of this block
+  /// Fails: kInvalidValue
   core::Status decode(std::span<const std::uint32_t> controls, float* out,
                       std::size_t stride) const;
   /// Whether the block describes the curve of a control as one constant value. False for all
@@ -67,8 +69,8 @@ class EncodedCurves {
   struct Pending;
   struct Part {
     enum Kind : std::uint8_t { kConstant, kCoded, kStored } kind = kConstant;
-    bool is_near_end = false;          // its bytes lie in tail_
-    std::uint32_t bits = 0;            // of kConstant
+    bool is_near_end = false;          // its bytes are read from tail_
+    std::uint32_t bits = 0;            // of kConstant: the bits of the float
     std::size_t offset = 0, size = 0;  // of the bytes of the other kinds
   };
   EncodedCurves();
@@ -83,7 +85,7 @@ class EncodedCurves {
   std::size_t frames_ = 0;
   std::vector<Part> parts_;
   std::unique_ptr<Tables> tables_;
-  Bytes tail_;  // a copy of the bytes from tail_begin_ on
+  Bytes tail_;  // a copy of the bytes from tail_begin_ on, and spare bytes after them
   std::size_t tail_begin_ = 0;
 };
 

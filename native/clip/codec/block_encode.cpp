@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Encodes curves as a block: chooses the kind of each curve and its predictor, and the prefix
+// codes of the symbols.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -29,10 +29,11 @@ class Encoder {
   /// Fails: kInvalidArgument, and nothing is appended
   core::Status append(std::span<const float> frames, std::span<const double> times);
   void add(Event event) { pending_.push_back(std::move(event)); }
-  /// Encodes the remaining frames and the index. Afterwards no frame may be appended.
+  /// Encodes the remaining frames and events and the index. Afterwards nothing may be appended.
   void finish();
 
-  /// Returns the finished bytes, and removes them from the encoder.
+  /// Returns the bytes that were encoded since the last call of take, and removes them from the
+  /// encoder: before finish, the head and the full blocks.
   Bytes take();
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_ + filled_; }

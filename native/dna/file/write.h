@@ -18,9 +18,9 @@ struct WriteOptions {
 };
 
 /// Writes the bytes of a file. Versions after 2.1 have the layers in the order of the source's
-/// index, then an empty layer for each layer of the version that the source lacks. If a layer that
-/// provides controls was not loaded or cannot be written, everything that its controls drive is
-/// left out too, with a warning, so that the file is consistent. A file with all layers of its
+/// index, then the other layers of the version, which are empty if `dna` lacks them. If a layer
+/// that provides controls was not loaded or cannot be written, everything that its controls drive
+/// is left out too, with a warning, so that the file is consistent. A file with all layers of its
 /// version, loaded whole and without warnings, gets the same bytes in this version.
 /// In/out: warnings  gets an entry for each layer and field that the version cannot hold, and one
 ///                   entry if other content is left out with the controls that drive it

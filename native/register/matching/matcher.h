@@ -21,9 +21,10 @@ struct Target {
 /// Properties of the template's vertices at the start of the registration. They stay constant while
 /// the vertices move.
 struct Looks {
-  std::vector<Bend> bends;           // [V]
-  std::vector<double> belief;        // [V] 0: has no counterpart, 1: has one
-  std::vector<double> inside;        // [V] 1: hidden in a cavity, which the target may also have
+  std::vector<Bend> bends;     // [V]
+  std::vector<double> belief;  // [V] 0: has no counterpart, 1: has one; between: uncertain
+  // [V] 1: hidden in a cavity, which the target may also have; all 0 if the caller gave `trusted`
+  std::vector<double> inside;
   std::vector<std::uint8_t> border;  // [V] not 0: on the border of the template
   std::vector<RimEdge> rim;          // the edges of that border
 };
@@ -43,10 +44,12 @@ class Matcher {
   Matcher(const Target& target, const Looks& looks, std::size_t threads);
 
   /// [V] matches with the target's samples that are nearest by position, normal and bending.
+  /// Vertices at the template's border are matched with the target's borders.
+  /// In: points, normals  [V] current vertices of the template, in millimetres
   std::vector<Match> by_features(const Points& points, const Points& normals,
                                  const Counting& counting) const;
-  /// The point of the target that is closest to a vertex, among triangles with a similar normal;
-  /// triangle -1: there is none.
+  /// The point of the target that is closest to a vertex, among triangles whose normal has at least
+  /// a given cosine with the vertex's normal; triangle -1: there is none.
   struct Closest {
     std::int32_t triangle = -1;
     Vec3 shares = Vec3::Zero();

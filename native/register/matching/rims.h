@@ -7,7 +7,8 @@
 
 namespace risorius::registering::steps {
 
-/// An edge at the border of a surface. Its triangle is to the left of the direction from a to b.
+/// An edge at the border of a surface. Seen from outside, its triangle is to the left of the
+/// direction from a to b.
 struct RimEdge {
   std::uint32_t a = 0, b = 0;
   double loop = 0.0;  // mm, total length of the edges that are connected with it
