@@ -20,7 +20,9 @@ from ..base import compat, saved
 from ..base.blender_types import Animated
 
 BEFORE = "risorius_before"  # on a datablock with a baked action: its animation before the bake
-BAKED_ACTION = "risorius_baked_action"  # marks a baked action, which `restore` removes
+# Custom property that marks a baked action. `restore` removes such an action if nothing else uses
+# it and the user did not edit it.
+BAKED_ACTION = "risorius_baked_action"
 _DIGEST = "risorius_digest"  # on a baked action: digest of its keys after the bake
 _LINEAR = 1  # number of Blender's interpolation "LINEAR"
 _AT_ONCE = 1 << 21  # approximate number of values (frames times columns) reduced in one call
@@ -135,7 +137,8 @@ def _reduced(
     Args:
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the key reduction; 0: keep all keys.
+        error: largest error of the key reduction, in the units of the values; 0: keep every key
+            of a curve that moves. A curve that stays at its first value keeps only one key.
         counts: totals, which this call increases.
     """
     most = max(_AT_ONCE // len(frames), 16)  # columns to collect before a reduction
@@ -315,8 +318,9 @@ def _set(owner: Animated, path: str, number: float) -> None:
 def restore(owner: Animated) -> None:
     """Restore the animation that a datablock had before `play`.
 
-    Baked actions are removed, unless another datablock uses them, the user gave them a fake user,
-    or the user edited them. An action that the user assigned since `play` stays in the file.
+    Muted drivers play again, and the values that `note_values` stored are set. Baked actions are
+    removed, unless another datablock uses them, the user gave them a fake user, or the user edited
+    them. An action that the user assigned since `play` is unassigned and gets a fake user.
     """
     if BEFORE not in owner:
         return
@@ -417,7 +421,8 @@ def note_tracks_by_name(owner: Animated) -> bool:
 def _remove_track(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[bpy.types.Action | None]:
-    """Remove the baked strips and restore mute and solo of the other tracks.
+    """Remove the baked strips and their tracks, except tracks with other strips; restore mute and
+    solo of the other tracks.
 
     Returns: the actions of the removed strips.
     """

@@ -88,7 +88,8 @@ class Stack:
         layers: risorius.Layer, bottom to top, at weight 1.
         places: index of each compiled layer in the collection of settings.
         weights: the weights in the mixer, by the index of the layer in that collection.
-        problems: index of a layer, or name of a reaction -> reason why it cannot be played.
+        problems: index of a layer, or name of a reaction -> reason why it cannot be played;
+            "Reactions" -> a sentence if there are more reactions than can be played.
         kept: compiled sources and masks, which the next Stack can reuse.
     """
 
@@ -439,7 +440,7 @@ _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": 
 
 
 def problems(controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene) -> list[str]:
-    """Sentences on layers that cannot be played.
+    """Sentences on layers and reactions that cannot be played.
 
     Args:
         controls: the original (not evaluated) control armature of the character.

@@ -159,7 +159,8 @@ def take(
 ) -> int:
     """Store edited sliders and bones in the tweak at a frame.
 
-    The sliders and bones are then reset to the values of the keys below the tweak.
+    The sliders and bones are then reset to the values of the keys below the tweak. If the face
+    board leads, all sliders that moved handles change are stored too, and the handles are reset.
 
     Args:
         controls: control armature with an active tweak.
@@ -464,7 +465,7 @@ def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
 
 
 def _layer(controls: ArmatureObject, tweak: Tweak) -> layer_properties.RISORIUS_PG_layer:
-    """The layer of a tweak; created if it does not exist."""
+    """The layer of a tweak; a new one is made if it does not exist or has lost its action."""
     found = _layer_of(controls, tweak)
     if found is not None and found.action is not None:
         return found

@@ -126,6 +126,8 @@ def remove(context: Context, rig: ArmatureObject) -> int:
 def corners(controls: ArmatureObject) -> NDArray[np.float64]:
     """float64[N, 3] in world space: the corners of a face board's border.
 
+    If the border has no custom shape, its origin is the only point.
+
     Args:
         controls: control armature with the board.
     """
@@ -151,7 +153,8 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 def _sideways(live: runtime.Runtime) -> dict[int, float]:
     """GUI control -> joint motion along +x, divided by the length of the motion; -1 to 1.
 
-    The motion is summed over all joints; +x is the left side of the face. Only controls that move
+    The motion from rest to the control's highest value is summed over all joints; +x is the left
+    side of the face. Only controls that move
     the middle of the face sideways are included. Their names do not define the direction, because
     "left" in jawLeft may mean the viewer's left.
     """
