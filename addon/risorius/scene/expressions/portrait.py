@@ -136,6 +136,9 @@ def draw_places(sitter: Sitter, placed: Sequence[Floats], size: int = SIZE) -> F
         sitter: the face.
         placed: vertices of each piece, from `places`.
         size: width and height in pixels.
+
+    Returns:
+        float64[size, size, 3] in [0, 1], row 0 at the bottom.
     """
     view, scale = _frame(sitter)
     high = size * _SMOOTH

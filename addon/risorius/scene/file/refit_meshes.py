@@ -364,6 +364,8 @@ def _refit_corners(
 ) -> None:
     """Update UVs, normals and the materials' attributes if the old and the new file differ.
 
+    A UV map that the user edited stays.
+
     Args:
         change: the replacement.
         item: the existing mesh object.

@@ -207,7 +207,10 @@ def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
 
 
 def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bool:
-    """Whether a character's controls are equal before and after the evaluation of the frame."""
+    """Whether a character's controls are equal before and after the evaluation of the frame.
+
+    False also if other inputs move the face, or if only one of both evaluations is for a render.
+    """
     controls = parts.controls_of(rig)
     if done.glance is None or controls is None:
         return False

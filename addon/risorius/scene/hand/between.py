@@ -80,7 +80,8 @@ def neighbours(
         skipped: frames whose keyframes do not count.
 
     Returns:
-        Neighbours. If there are only earlier or only later keyframes, both poses are equal.
+        Neighbours. If there are only earlier or only later keyframes, both poses are equal, and
+        `share` is 0.5.
 
     Raises:
         FaceError: there is no earlier and no later keyframe.
