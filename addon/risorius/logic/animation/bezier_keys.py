@@ -135,8 +135,14 @@ class Fitter:
     ) -> tuple[int, tuple[float, float]]:
         """Find how many samples one cubic covers.
 
-        Returns: index of the last sample that a cubic from sample `first` covers, and the values
-        of the two handles of this cubic.
+        Args:
+            frames, values: float64[n], all samples.
+            first: index of the sample at which the cubic begins.
+            even: whether the samples are equally spaced, so that cached matrices can be used.
+
+        Returns:
+            Index of the last sample that a cubic from sample `first` covers, and the values of the
+            two handles of this cubic.
         """
         low, high = values[first], values[first + 1]
         best = first + 1, (low + (high - low) / 3.0, high - (high - low) / 3.0)

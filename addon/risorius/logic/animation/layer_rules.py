@@ -84,7 +84,11 @@ class Span:
         return self.start, self.start + self.period * self.repeat
 
     def source(self, frames: Float) -> Float:
-        """The source's frames that the layer shows at given frames of the scene."""
+        """The source's frames that the layer shows at given frames of the scene.
+
+        Before the start and after the end, the source repeats; a warp holds its first and last
+        frame.
+        """
         if self.warp is not None:
             return np.interp(frames, *self.warp)
         if not self.period > 0.0:

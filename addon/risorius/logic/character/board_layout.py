@@ -89,7 +89,7 @@ class Handle:
 
 @dataclass(frozen=True)
 class Board:
-    """A complete face board, centred at 0, 0.
+    """A face board of either kind (complete or primary), centred at 0, 0.
 
     Attributes:
         handles: its handles.
@@ -413,7 +413,14 @@ def frame_of(handle: Handle) -> tuple[float, float, float, float]:
 def _face_block(
     title: str, sides: _Columns, middle: _Columns, left: Sequence[Handle]
 ) -> _Block | None:
-    """A block of the handles with known names, or None if the face has none of them."""
+    """A block of the handles with known names, or None if the face has none of them.
+
+    Args:
+        title: title of the block.
+        sides: columns of stems on each side of the face, from the outer edge inwards, as in _FACE.
+        middle: columns of stems in the middle.
+        left: the handles that are not placed yet.
+    """
     by_name = {(h.side, h.stem.lower()): h for h in left}
 
     def columns(side: str, wanted: _Columns) -> list[list[_Cell]]:
@@ -443,7 +450,13 @@ def _face_block(
 
 
 def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block | None:
-    """A block of the remaining handles of a region in rows, or None if there are none."""
+    """A block of the remaining handles of a region in rows, or None if there are none.
+
+    Args:
+        title: title of the block.
+        handles: the handles of the region.
+        width: width of the board between its margins, in board units.
+    """
     if not handles:
         return None
     block = _Block(title)

@@ -156,7 +156,13 @@ def _ways_of(part: Part, side: str, index: Mapping[str, int]) -> Iterator[_Way]:
 
 
 def _raws(led: Led, side: str, index: Mapping[str, int]) -> dict[int, float]:
-    """Index of each raw control that half an axis drives -> weight."""
+    """Index of each raw control that half an axis drives -> weight.
+
+    Args:
+        led: raw controls of the half axis, without prefix and side -> weight.
+        side: side of the handle, "L" or "R"; "" drives both sides of each raw control.
+        index: name of a raw control without prefix -> its index in the face.
+    """
     out: dict[int, float] = {}
     for stem, share in led.items():
         wanted = (stem + side,) if side else (stem, f"{stem}L", f"{stem}R")

@@ -305,7 +305,13 @@ def _set_back(owner: Animated, lines: Iterable[str]) -> None:
 
 
 def _set(owner: Animated, path: str, number: float) -> None:
-    """Set a property by its path: a custom property in brackets, or an attribute."""
+    """Set a property by its path: a custom property in brackets, or an attribute.
+
+    Args:
+        owner: the datablock from which the path starts.
+        path: data path of one number.
+        number: the new value.
+    """
     if path.endswith('"]'):
         where, key = path[:-2].rsplit('["', 1)
         item = owner.path_resolve(where) if where else owner
@@ -421,10 +427,14 @@ def note_tracks_by_name(owner: Animated) -> bool:
 def _remove_track(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[bpy.types.Action | None]:
-    """Remove the baked strips and their tracks, except tracks with other strips; restore mute and
-    solo of the other tracks.
+    """Remove the baked strips, and tracks that are empty then; restore mute and solo of the others.
 
-    Returns: the actions of the removed strips.
+    Args:
+        data: the animation data with the NLA tracks.
+        state: the state that `keep` and `play` stored.
+
+    Returns:
+        The actions of the removed strips.
     """
     own = _baked_strips(data, state)
     played: list[bpy.types.Action | None] = []

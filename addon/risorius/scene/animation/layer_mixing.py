@@ -239,7 +239,16 @@ def _compile(
     made_of: tuple[object, ...],
     old: Stack | None,
 ) -> Stack:
-    """Compile a new Stack. Args: old  the earlier Stack, whose unchanged curves are reused."""
+    """Compile a new Stack.
+
+    Args:
+        controls: the original control armature.
+        live: the character's Runtime.
+        rate: frames per second.
+        maximum: largest value of a slider.
+        made_of: the settings from which the Stack is made, for a later comparison.
+        old: the earlier Stack, whose unchanged curves are reused; None: there is none.
+    """
     same = old if old is not None and old.made_of[0] == made_of[0] else None
     stack = Stack(made_of, _mixer(controls, live, maximum) if same is None else same.mixer)
     kept = Kept() if same is None else same.kept

@@ -323,7 +323,14 @@ def _rows_of(curves: Curves, path: str) -> list[bpy.types.FCurve | None]:
 def _insert(
     controls: ArmatureObject, tweak: Tweak, rows: Mapping[str, Sequence[float]], frame: float
 ) -> None:
-    """Insert keys into the layer of a tweak. Args: rows  components by data path."""
+    """Insert keys into the layer of a tweak.
+
+    Args:
+        controls: the control armature.
+        tweak: the active tweak; its layer is made if it does not exist.
+        rows: data path -> value of each component.
+        frame: frame of the scene.
+    """
     layer = _layer(controls, tweak)
     action = layer.action
     bag = compat.bag_for(action, controls)
@@ -454,8 +461,14 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
 
 
 def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
-    """Slider -> change of its value by moved handles, if the face board leads. The handles return
-    to the pose without the tweak."""
+    """Slider -> change of its value by moved handles; empty unless the face board leads.
+
+    The handles return to the pose without the tweak.
+
+    Args:
+        controls: the control armature.
+        below: the pose without the tweak.
+    """
     rig = parts.rig_of(controls)
     if rig is None or not board.leads_face(rig):
         return {}

@@ -115,6 +115,11 @@ def _stage(
     """Context manager: the scene in which frames are evaluated.
 
     This is a new scene with the given objects, or the user's scene if necessary.
+
+    Args:
+        context: its scene is the user's scene.
+        rigs: deforming armatures of the sampled faces.
+        items: objects for the new scene.
     """
     if _needs_whole_scene(context.scene, rigs):
         with _whole_scene(context.scene) as scene:

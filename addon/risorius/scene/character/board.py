@@ -201,7 +201,15 @@ def _read_moved(
     axes: Iterable[tuple[int, int]],
     gui: Floats,
 ) -> None:
-    """Read a handle that the user's constraints move. Args: axes  (index into places.at, axis)."""
+    """Read a handle that the user's constraints move.
+
+    Args:
+        seen: the control armature, evaluated or original.
+        bone: bone of the handle.
+        places: indices and ranges of the handle values.
+        axes: (index into places.at, axis) of each value of this handle.
+        gui: float32[G], values of the GUI controls; changed in place.
+    """
     local: Matrix = seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
     )

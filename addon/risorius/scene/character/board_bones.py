@@ -276,7 +276,14 @@ def _build(
 
 
 def _dress(controls: ArmatureObject, layout: Board, names: Sequence[str], unit: float) -> None:
-    """Set shapes, colours, limits and locks of the new bones. Args: names  of these bones."""
+    """Set shapes, colours, limits and locks of the new bones.
+
+    Args:
+        controls: control armature with the bones.
+        layout: the whole board.
+        names: names of the new bones.
+        unit: Blender units per board unit, the scale of the bone `board`.
+    """
     name = controls.name.removesuffix("_controls")
     disc: bpy.types.Object | None = None
     for bone in controls.pose.bones:

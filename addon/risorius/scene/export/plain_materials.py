@@ -214,6 +214,11 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
     """Write UV coordinates of some corners into the UV map for baking.
 
     A missing UV map for baking is created as a copy of the UV map that is active for rendering.
+
+    Args:
+        mesh: the copied mesh.
+        corners: int64[n], indices of the corners.
+        part: float32[n, 2], their UV coordinates.
     """
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)

@@ -210,6 +210,11 @@ def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bo
     """Whether a character's controls are equal before and after the evaluation of the frame.
 
     False also if other inputs move the face, or if only one of both evaluations is for a render.
+
+    Args:
+        rig: deforming armature.
+        done: the work done before the frame.
+        depsgraph: graph after the evaluation of the frame.
     """
     controls = parts.controls_of(rig)
     if done.glance is None or controls is None:

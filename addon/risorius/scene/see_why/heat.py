@@ -274,7 +274,9 @@ def follow_undo() -> None:
 
 
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
-    """Update the colours of a character if its pose has changed. Returns: whether the pose changed.
+    """Update the colours of a character if its pose, LOD, solo or mute changed.
+
+    The colours of a CONTROL depend on the LOD alone. Returns: whether an update was necessary.
 
     Args:
         rig: its deforming armature, with a heat map.

@@ -216,6 +216,11 @@ def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.ty
     """Move an override to the position of an instance of the linked collection.
 
     The instance then shows nothing, and is deleted if no other datablock uses it.
+
+    Args:
+        shown: the object that shows the instance.
+        rig: deforming armature of the override.
+        collection: not used.
     """
     place = shown.matrix_world.copy()
     shown.instance_collection = None
