@@ -17,7 +17,7 @@ from ..character import slider_words
 Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
 _PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
-_LIMIT = 100_000  # most samples of one source between its keys
+_LIMIT = 100_000  # largest number of samples of a source in addition to its keys
 _NEAR = 1e-7  # times that differ by fewer frames are merged
 
 

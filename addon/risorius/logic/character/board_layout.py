@@ -24,8 +24,8 @@ RIGHT, LEFT, UP, DOWN = (1, 0), (-1, 0), (0, 1), (0, -1)
 Direction = tuple[int, int]
 
 _TEXT, _TITLE = 0.29, 0.46  # heights of letters in labels and titles, in board units
-_TRACK = 0.34  # width of a slider's frame
-_GAP = 0.3  # between sliders
+_TRACK = 0.34  # width of the frame of a handle that moves along one axis
+_GAP = 0.3  # between neighbouring frames, and between cells (frames with a common label)
 _MARGIN = 0.6  # around the board
 _LONGEST = 10  # most letters in a line of several words of a label
 _WIDEST, _LINES = 14, 4  # longest word in letters, and most lines of a label

@@ -206,7 +206,7 @@ def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
 
     Args:
         base: mesh name without its LOD.
-        kind: kind of the mesh, see MeshPlan.
+        kind: kind of the mesh, such as skin or eyes.
         skins: base names of all skin meshes.
     """
     word = base.lower()

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads the inputs of a face (sliders, rotations, other animation) at the frames of a range.
 
-Blender evaluates actions, NLA, drivers and constraints in a separate scene that has only the two
-armatures of the face and the objects they depend on, such as the armature of its body. The result
+Blender evaluates actions, NLA, drivers and constraints in a separate scene. The scene has only the
+two armatures of the face, the meshes whose shape keys the user animates, and the objects on which
+these depend, such as the armature of the body. The result
 of every frame equals frame stepping in the user's scene. Other objects of the user's scene are not
 evaluated, and its current frame does not change. A few features need the user's
 scene itself (`_needs_whole_scene`); its frame is restored afterwards.

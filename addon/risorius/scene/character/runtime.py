@@ -233,7 +233,8 @@ def there(rig: ArmatureObject, board: str | None = None) -> Runtime:
     """The Runtime of a character; the caller must have checked that `of` gives one.
 
     Args:
-        rig, board: see `of`.
+        rig: the deforming armature.
+        board: PRIMARY or COMPLETE; None: the kind of the character's board.
     """
     live = of(rig, board)
     assert live is not None

@@ -91,7 +91,7 @@ def is_paused() -> bool:
 
 
 def evaluate_all(depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> None:
-    """Evaluate all characters of this file and write their poses.
+    """Evaluate all characters of this file and write their poses; does nothing while `paused`.
 
     Args:
         depsgraph: the evaluated dependency graph to read from.
