@@ -264,7 +264,7 @@ def multiply(a: Float, b: Float) -> Float:
 
 
 def near_signs(turns: Float) -> Float:
-    """The same rotations, each quaternion with the sign that is nearest to its predecessor."""
+    """Quaternions float64[n, 4], each negated where that makes it nearer to its predecessor."""
     flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     signs = np.concatenate([[1.0], np.cumprod(flips)]) if len(turns) else np.ones(0)
     return turns * signs[:, None]

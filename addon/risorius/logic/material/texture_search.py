@@ -93,7 +93,7 @@ PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Mask:
-    """A region's mask: an image file, and the colour channel, 0 (red) to 3 (alpha)."""
+    """The mask of a wrinkle region: path of the image, and colour channel, 0 (red) to 3 (alpha)."""
 
     path: Path
     channel: int

@@ -21,9 +21,9 @@ from ..base.blender_types import Animated
 
 BEFORE = "risorius_before"  # on a datablock with a baked action: its animation before the bake
 # Custom property that marks a baked action. `restore` removes such an action if nothing else uses
-# it and the user did not edit it.
+# it and the user did not edit its keys (see `was_edited`).
 BAKED_ACTION = "risorius_baked_action"
-_DIGEST = "risorius_digest"  # on a baked action: digest of its keys after the bake
+_DIGEST = "risorius_digest"  # on a baked action: result of `_digest` after the bake
 _LINEAR = 1  # number of Blender's interpolation "LINEAR"
 _AT_ONCE = 1 << 21  # approximate number of values (frames times columns) reduced in one call
 
@@ -185,20 +185,21 @@ def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[n
 
 
 def was_edited(action: bpy.types.Action) -> bool:
-    """Whether the keys of an action changed since the last call of `stamp`.
+    """Whether the frames or values of an action's keys changed since the last call of `stamp`.
 
-    True if `stamp` was never called for the action.
+    Edits of handles and interpolation are not noticed. True if `stamp` was never called for the
+    action.
     """
     return action.get(_DIGEST) != _digest(action)
 
 
 def stamp(action: bpy.types.Action) -> None:
-    """Store a digest of the keys of an action, to notice later edits."""
+    """Store a digest of the frames and values of an action's keys for `was_edited`."""
     action[_DIGEST] = _digest(action)
 
 
 def _digest(action: bpy.types.Action) -> str:
-    """A digest of an action's keys; it differs after an edit."""
+    """A digest of data path, index, and frames and values of the keys of an action's F-curves."""
     found = hashlib.sha1(usedforsecurity=False)
     for curve in compat.curves_of(action):
         places = np.empty(len(curve.keyframe_points) * 2, np.float32)

@@ -269,7 +269,7 @@ def _moved(before: Pose, after: Pose) -> tuple[list[str], list[str]]:
 
 
 def selected_frames(controls: ArmatureObject) -> list[float]:
-    """The frames at which F-curves of a face have selected keyframes, ascending."""
+    """The frames of selected keys of sliders and bones in the face's active action, ascending."""
     found = {
         round(key.co.x, 3)
         for path, curves in curves_by_path(controls).items()

@@ -117,7 +117,7 @@ class Stroke:
 
     @property
     def dragged_region(self) -> str:
-        """The region of the control that moves the point most."""
+        """The region of the control that moves the point most, of those that the drag may move."""
         strongest = int(np.argmax(np.linalg.norm(self.reach, axis=0) * self.state.free))
         return native.regions().of_slider(self.live.labels[strongest])
 

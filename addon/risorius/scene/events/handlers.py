@@ -45,8 +45,8 @@ class _Work:
 
 
 _work = session.keep("handlers.work", _Work, ("unregister",))
-# Session uids of known objects, of known control armatures, and of deforming armatures that were
-# repaired since the last update.
+# Session uids. _objects: known objects of the file; empty after load and undo. _faces: known
+# control armatures. _mended: deforming armatures that were repaired since the last update.
 _objects = session.value("handlers.objects", frozenset[int](), ("undo", "load"))
 _faces = session.value("handlers.faces", frozenset[int](), ("unregister",))
 _mended: set[int] = session.keep("handlers.mended", set, ("load",))

@@ -35,7 +35,10 @@ def usable_head(item: bpy.types.Object | None) -> bool:
 
 
 def head_of(context: Context) -> MeshObject | None:
-    """The active object if it is a usable head, else the first usable selected object, or None."""
+    """The active object if `usable_head` accepts it, else the first selected object it accepts.
+
+    None if it accepts no such object.
+    """
     there = [context.active_object, *context.selected_objects]
     return next((cast(MeshObject, item) for item in there if usable_head(item)), None)
 

@@ -70,7 +70,9 @@ def of(rig: ArmatureObject) -> Heat | None:
 
 
 def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Heat:
-    """Colour the meshes of a character.
+    """Colour the meshes of a character, and let the 3D views show the colours.
+
+    The choice is stored on the deforming armature, and a timer updates the colours from then on.
 
     Args:
         rig: its deforming armature.

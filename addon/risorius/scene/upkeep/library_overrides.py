@@ -215,7 +215,8 @@ def _unlink(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
 def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.types.ID) -> None:
     """Move an override to the position of an instance of the linked collection.
 
-    The instance then shows nothing, and is deleted if no other datablock uses it.
+    The instance then shows nothing, and is deleted if it has no children and no other datablock
+    uses it.
 
     Args:
         shown: the object that shows the instance.
@@ -233,7 +234,7 @@ def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.ty
 
 
 def _show(context: Context, rig: ArmatureObject) -> None:
-    """Select the controls, as after an import."""
+    """Select only the control armature of a character, and make it active, as after an import."""
     layer, controls = context.view_layer, parts.controls_of(rig)
     compat.deselect_all(layer)
     if controls is not None and controls.name in layer.objects:
