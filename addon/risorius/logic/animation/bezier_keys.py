@@ -76,7 +76,11 @@ class Fitter:
     """
 
     def __init__(self, tolerance: float) -> None:
-        """Args: tolerance  largest difference of a curve's value from a sample, above 0."""
+        """Prepare fits.
+
+        Args:
+            tolerance: largest difference of a curve's value from a sample, above 0.
+        """
         self._most = max(tolerance - _ROUNDING, _ROUNDING)
         self._bases: dict[int, _Basis] = {}
         self._done: dict[tuple[bytes, bytes], Bezier] = {}

@@ -233,7 +233,9 @@ def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
 def is_middle(table: BoardTable, gui: int) -> bool:
     """Whether a GUI control belongs to no side.
 
-    Args: table  all GUI controls; gui  index of the GUI control.
+    Args:
+        table: all GUI controls.
+        gui: index of the GUI control.
     """
     return not _side_of(_bone_of(table.names[gui])[0])
 
@@ -382,7 +384,9 @@ def _label(stem: str, region: str) -> list[str]:
 def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
     """Place handles in centred rows with a label below.
 
-    Args: rows  from the top down, left to right.
+    Args:
+        rows: rows of handles, from the top down; each row from left to right.
+        label: the lines of the label.
     """
     boxes = [[frame_of(h) for h in row] for row in rows]
     widths = [sum(f[2] - f[0] for f in row) + _GAP * (len(row) - 1) for row in boxes]
@@ -401,10 +405,7 @@ def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
 
 
 def frame_of(handle: Handle) -> tuple[float, float, float, float]:
-    """Left, bottom, right and top of a handle's frame, relative to its rest place.
-
-    Args: handle the handle.
-    """
+    """Left, bottom, right and top of a handle's frame, relative to its rest place."""
     left, bottom, right, top = handle.box()
     half = _TRACK / 2
     return left - half, bottom - half, right + half, top + half

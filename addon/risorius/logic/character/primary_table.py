@@ -118,10 +118,14 @@ class _Way:
 
 
 def bone_of(part: Part, side: str) -> str:
-    """The name of a handle's bone. Args: part the handle; side "L" or "R", "" for none.
+    """The name of a handle's bone.
 
     The side is in the middle of the name, where Blender does not recognise it. Otherwise Blender
     would mirror handles about the armature's centre instead of the board's centre.
+
+    Args:
+        part: the handle, or the pair of handles to which it belongs.
+        side: "L" or "R"; "" for none.
     """
     return f"face_{side}_{part.stem}" if side else f"face_{part.stem}"
 

@@ -173,7 +173,9 @@ def _blended(
 def rest_pose(rig: ArmatureObject, now: keying.Pose) -> keying.Pose:
     """The rest values of the sliders and bones that the pose `now` contains.
 
-    Args: rig  the character, now  the pose.
+    Args:
+        rig: the character.
+        now: the pose.
     """
     live = runtime.there(rig)
     rests = dict(zip(live.labels, live.rests, strict=True))

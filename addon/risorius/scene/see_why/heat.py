@@ -245,7 +245,11 @@ def take_away() -> None:
 
 
 def give_back(depsgraph: Depsgraph) -> None:
-    """Restore the heat maps that `take_away` removed. Args: depsgraph  graph to read layers."""
+    """Restore the heat maps that `take_away` removed.
+
+    Args:
+        depsgraph: graph from which animation layers are read.
+    """
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)
         if kept is not None:

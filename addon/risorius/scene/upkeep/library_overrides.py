@@ -154,8 +154,11 @@ def _localize(item: MeshObject, owned: dict[str, bpy.types.Material]) -> None:
     """Copy a mesh into this file, with copies of its override materials.
 
     Without the mesh these materials would be outside the hierarchy of the override, and Blender
-    would delete them when the library changes. Args: owned  override material's name -> copy,
-    filled here.
+    would delete them when the library changes.
+
+    Args:
+        item: the mesh object.
+        owned: name of an override material -> its copy; new copies are added.
     """
     left = [item.data, *item.data.materials]
     item.data = _local_copy(item.data)
