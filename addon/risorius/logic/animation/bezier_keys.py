@@ -76,7 +76,11 @@ class Fitter:
     """
 
     def __init__(self, tolerance: float) -> None:
-        """Args: tolerance  largest difference of a curve's value from a sample, above 0."""
+        """Prepare fits.
+
+        Args:
+            tolerance: largest difference of a curve's value from a sample, above 0.
+        """
         self._most = max(tolerance - _ROUNDING, _ROUNDING)
         self._bases: dict[int, _Basis] = {}
         self._done: dict[tuple[bytes, bytes], Bezier] = {}
@@ -135,8 +139,14 @@ class Fitter:
     ) -> tuple[int, tuple[float, float]]:
         """Find how many samples one cubic covers.
 
-        Returns: index of the last sample that a cubic from sample `first` covers, and the values
-        of the two handles of this cubic.
+        Args:
+            frames, values: float64[n], all samples.
+            first: index of the sample at which the cubic begins.
+            even: whether the samples are equally spaced, so that cached matrices can be used.
+
+        Returns:
+            Index of the last sample that a cubic from sample `first` covers, and the values of the
+            two handles of this cubic.
         """
         low, high = values[first], values[first + 1]
         best = first + 1, (low + (high - low) / 3.0, high - (high - low) / 3.0)

@@ -16,7 +16,8 @@ Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 NECK = ("neck.yaw", "neck.pitch", "neck.roll")
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
-TARGET = ("eyes.x", "eyes.y", "eyes.z")  # position of the gaze target in the gaze target's axes
+# Offset of the gaze target from its rest place, in Blender units and in the axes of its bone.
+TARGET = ("eyes.x", "eyes.y", "eyes.z")
 TURNS = {"head": HEAD, "neck": NECK, **{f"eye_{side}": names for side, names in EYES.items()}}
 BONES = (*(name for names in TURNS.values() for name in names), *TARGET)  # curves that move bones
 LAST_FRAME = 1_048_574  # Blender's own limit of a scene
@@ -263,7 +264,7 @@ def multiply(a: Float, b: Float) -> Float:
 
 
 def near_signs(turns: Float) -> Float:
-    """The same rotations, each quaternion with the sign that is nearest to its predecessor."""
+    """Quaternions float64[n, 4], each negated where that makes it nearer to its predecessor."""
     flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     signs = np.concatenate([[1.0], np.cumprod(flips)]) if len(turns) else np.ones(0)
     return turns * signs[:, None]

@@ -17,7 +17,7 @@ from ..character import slider_words
 Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
 _PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
-_LIMIT = 100_000  # most samples of one source between its keys
+_LIMIT = 100_000  # largest number of samples of a source in addition to its keys
 _NEAR = 1e-7  # times that differ by fewer frames are merged
 
 
@@ -84,7 +84,11 @@ class Span:
         return self.start, self.start + self.period * self.repeat
 
     def source(self, frames: Float) -> Float:
-        """The source's frames that the layer shows at given frames of the scene."""
+        """The source's frames that the layer shows at given frames of the scene.
+
+        Before the start and after the end, the source repeats; a warp holds its first and last
+        frame.
+        """
         if self.warp is not None:
             return np.interp(frames, *self.warp)
         if not self.period > 0.0:

@@ -374,6 +374,13 @@ def _renamed(
 ) -> Sound:
     """The sound with the word and the mouth shape in a marker's name.
 
+    Args:
+        mark: the marker with its current name.
+        before: the marker as the add-on created it.
+        sound: the sound of the marker.
+        label: converts a phoneme to the name of its mouth shape.
+        named: converts the name of a mouth shape or phoneme to a phoneme; None if unknown.
+
     Raises:
         SpokenError: the name contains no known mouth shape or phoneme.
     """

@@ -94,7 +94,13 @@ def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int
     """Refit two GUI controls that drive the same raw control, if that improves a pose.
 
     One of them can drive the raw control so far that the other has no effect. So both are set to 0
-    and fitted in both orders. Args: gui  is changed in the poses that improve.
+    and fitted in both orders.
+
+    Args:
+        table: GUI controls of the face.
+        wanted: float64[N, R], wanted raw controls of N poses.
+        gui: float64[N, G], GUI controls, which are changed in the poses that improve.
+        pair: indices of the two GUI controls.
     """
     left = _cost(table, wanted, gui)
     for order in (pair, pair[::-1]):

@@ -427,9 +427,14 @@ def _plan_mesh(
 def _faces(
     mesh: MeshData, layouts: NDArray[np.int64], flip: bool
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """First corner of each face, and layout of each corner.
+    """First corner of each face, int32[F], and layout of each corner, int64[N].
 
     Faces with fewer than 3 corners or a repeated vertex are left out.
+
+    Args:
+        mesh: the mesh in the DNA file.
+        layouts: int64[L], vertex of each layout.
+        flip: True: reverse the order of the corners of each face.
     """
     bounds = np.asarray(mesh.face_offsets, np.int64)
     flat = np.asarray(mesh.face_layouts, np.int64)

@@ -118,10 +118,14 @@ class _Way:
 
 
 def bone_of(part: Part, side: str) -> str:
-    """The name of a handle's bone. Args: part the handle; side "L" or "R", "" for none.
+    """The name of a handle's bone.
 
     The side is in the middle of the name, where Blender does not recognise it. Otherwise Blender
     would mirror handles about the armature's centre instead of the board's centre.
+
+    Args:
+        part: the handle, or the pair of handles to which it belongs.
+        side: "L" or "R"; "" for none.
     """
     return f"face_{side}_{part.stem}" if side else f"face_{part.stem}"
 
@@ -156,7 +160,13 @@ def _ways_of(part: Part, side: str, index: Mapping[str, int]) -> Iterator[_Way]:
 
 
 def _raws(led: Led, side: str, index: Mapping[str, int]) -> dict[int, float]:
-    """Index of each raw control that half an axis drives -> weight."""
+    """Index of each raw control that half an axis drives -> weight.
+
+    Args:
+        led: raw controls of the half axis, without prefix and side -> weight.
+        side: side of the handle, "L" or "R"; "" drives both sides of each raw control.
+        index: name of a raw control without prefix -> its index in the face.
+    """
     out: dict[int, float] = {}
     for stem, share in led.items():
         wanted = (stem + side,) if side else (stem, f"{stem}L", f"{stem}R")

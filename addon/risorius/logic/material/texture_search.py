@@ -93,7 +93,7 @@ PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Mask:
-    """A region's mask: an image file, and the colour channel, 0 (red) to 3 (alpha)."""
+    """The mask of a wrinkle region: path of the image, and colour channel, 0 (red) to 3 (alpha)."""
 
     path: Path
     channel: int
@@ -206,7 +206,7 @@ def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
 
     Args:
         base: mesh name without its LOD.
-        kind: kind of the mesh, see MeshPlan.
+        kind: kind of the mesh, such as skin or eyes.
         skins: base names of all skin meshes.
     """
     word = base.lower()

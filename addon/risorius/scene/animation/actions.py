@@ -20,8 +20,10 @@ from ..base import compat, saved
 from ..base.blender_types import Animated
 
 BEFORE = "risorius_before"  # on a datablock with a baked action: its animation before the bake
-BAKED_ACTION = "risorius_baked_action"  # marks a baked action, which `restore` removes
-_DIGEST = "risorius_digest"  # on a baked action: digest of its keys after the bake
+# Custom property that marks a baked action. `restore` removes such an action if nothing else uses
+# it and the user did not edit its keys (see `was_edited`).
+BAKED_ACTION = "risorius_baked_action"
+_DIGEST = "risorius_digest"  # on a baked action: result of `_digest` after the bake
 _LINEAR = 1  # number of Blender's interpolation "LINEAR"
 _AT_ONCE = 1 << 21  # approximate number of values (frames times columns) reduced in one call
 
@@ -135,7 +137,8 @@ def _reduced(
     Args:
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the key reduction; 0: keep all keys.
+        error: largest error of the key reduction, in the units of the values; 0: keep every key
+            of a curve that moves. A curve that stays at its first value keeps only one key.
         counts: totals, which this call increases.
     """
     most = max(_AT_ONCE // len(frames), 16)  # columns to collect before a reduction
@@ -182,20 +185,21 @@ def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[n
 
 
 def was_edited(action: bpy.types.Action) -> bool:
-    """Whether the keys of an action changed since the last call of `stamp`.
+    """Whether the frames or values of an action's keys changed since the last call of `stamp`.
 
-    True if `stamp` was never called for the action.
+    Edits of handles and interpolation are not noticed. True if `stamp` was never called for the
+    action.
     """
     return action.get(_DIGEST) != _digest(action)
 
 
 def stamp(action: bpy.types.Action) -> None:
-    """Store a digest of the keys of an action, to notice later edits."""
+    """Store a digest of the frames and values of an action's keys for `was_edited`."""
     action[_DIGEST] = _digest(action)
 
 
 def _digest(action: bpy.types.Action) -> str:
-    """A digest of an action's keys; it differs after an edit."""
+    """A digest of data path, index, and frames and values of the keys of an action's F-curves."""
     found = hashlib.sha1(usedforsecurity=False)
     for curve in compat.curves_of(action):
         places = np.empty(len(curve.keyframe_points) * 2, np.float32)
@@ -302,7 +306,13 @@ def _set_back(owner: Animated, lines: Iterable[str]) -> None:
 
 
 def _set(owner: Animated, path: str, number: float) -> None:
-    """Set a property by its path: a custom property in brackets, or an attribute."""
+    """Set a property by its path: a custom property in brackets, or an attribute.
+
+    Args:
+        owner: the datablock from which the path starts.
+        path: data path of one number.
+        number: the new value.
+    """
     if path.endswith('"]'):
         where, key = path[:-2].rsplit('["', 1)
         item = owner.path_resolve(where) if where else owner
@@ -315,8 +325,9 @@ def _set(owner: Animated, path: str, number: float) -> None:
 def restore(owner: Animated) -> None:
     """Restore the animation that a datablock had before `play`.
 
-    Baked actions are removed, unless another datablock uses them, the user gave them a fake user,
-    or the user edited them. An action that the user assigned since `play` stays in the file.
+    Muted drivers play again, and the values that `note_values` stored are set. Baked actions are
+    removed, unless another datablock uses them, the user gave them a fake user, or the user edited
+    them. An action that the user assigned since `play` is unassigned and gets a fake user.
     """
     if BEFORE not in owner:
         return
@@ -417,9 +428,14 @@ def note_tracks_by_name(owner: Animated) -> bool:
 def _remove_track(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[bpy.types.Action | None]:
-    """Remove the baked strips and restore mute and solo of the other tracks.
+    """Remove the baked strips, and tracks that are empty then; restore mute and solo of the others.
 
-    Returns: the actions of the removed strips.
+    Args:
+        data: the animation data with the NLA tracks.
+        state: the state that `keep` and `play` stored.
+
+    Returns:
+        The actions of the removed strips.
     """
     own = _baked_strips(data, state)
     played: list[bpy.types.Action | None] = []

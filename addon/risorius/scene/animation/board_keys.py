@@ -36,7 +36,9 @@ class Converted:
         loss: largest change of a raw control by the conversion, over the pose and all frames.
         kept: the unconverted action, kept with a fake user; None if no action was converted.
         curves: number of new F-curves.
-        idle: names of other actions of the face whose keys have no effect after the switch.
+        idle: names of played actions that have keys of the controls that no longer lead (sliders or
+            handles); these keys have no effect. With unconverted keys, the active action is among
+            them.
     """
 
     loss: board_fit.Loss = field(default_factory=board_fit.Loss)
@@ -109,8 +111,8 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
         kind: kind of the new board, runtime.PRIMARY or runtime.COMPLETE.
 
     Returns:
-        The result of the conversion to the new board. If the sliders lead, nothing is converted
-        and all attributes have their defaults.
+        The result of the conversion to the new board; `kept` is the action with keys of the old
+        board. If the sliders lead, nothing is converted and all attributes have their defaults.
     """
     controls, done = parts.controls_there(rig), Converted()
     led = board.leads_face(rig)
@@ -134,7 +136,7 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
 
     Args:
         rig: the character that will play the action.
-        action: an action that no other datablock plays.
+        action: a new action, which is changed in place; no datablock plays it yet.
 
     Returns:
         Sentences for a report; empty if the sliders lead.

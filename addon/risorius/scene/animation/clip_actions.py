@@ -314,7 +314,9 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
 
 
 def add_strip(rig: ArmatureObject, action: bpy.types.Action, name: str = "") -> bpy.types.NlaStrip:
-    """Add an action as a strip of a new NLA track, at the frames of its keys.
+    """Add an action as a strip of a new NLA track, at the frames of the action.
+    The frames are the manual frame range of the action, or else the range from its first to its
+    last key; the strip is at least one frame long, and holds its last frame.
 
     Args:
         rig: deforming armature of the character.
@@ -428,7 +430,7 @@ def is_bent(curve: bpy.types.FCurve) -> bool:
 
 
 def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves of an action that move a datablock. Muted curves are left out.
+    """The F-curves of an action that move a datablock. Muted curves and groups are left out.
 
     Args:
         action: any action.
@@ -553,7 +555,8 @@ def _from_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[
 def add_sound(
     scene: bpy.types.Scene, path: str | Path, frame: float, name: str = ""
 ) -> bpy.types.SoundStrip:
-    """Add a sound strip to the sequencer, on the first free channel.
+    """Add a sound strip to the sequencer, on the first channel on which no strip ends later than
+    the start of the sound; on channel 128 if there is no such channel.
 
     Args:
         scene: the scene.

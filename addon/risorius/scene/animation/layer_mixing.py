@@ -88,7 +88,8 @@ class Stack:
         layers: risorius.Layer, bottom to top, at weight 1.
         places: index of each compiled layer in the collection of settings.
         weights: the weights in the mixer, by the index of the layer in that collection.
-        problems: index of a layer, or name of a reaction -> reason why it cannot be played.
+        problems: index of a layer, or name of a reaction -> reason why it cannot be played;
+            "Reactions" -> a sentence if there are more reactions than can be played.
         kept: compiled sources and masks, which the next Stack can reuse.
     """
 
@@ -238,7 +239,16 @@ def _compile(
     made_of: tuple[object, ...],
     old: Stack | None,
 ) -> Stack:
-    """Compile a new Stack. Args: old  the earlier Stack, whose unchanged curves are reused."""
+    """Compile a new Stack.
+
+    Args:
+        controls: the original control armature.
+        live: the character's Runtime.
+        rate: frames per second.
+        maximum: largest value of a slider.
+        made_of: the settings from which the Stack is made, for a later comparison.
+        old: the earlier Stack, whose unchanged curves are reused; None: there is none.
+    """
     same = old if old is not None and old.made_of[0] == made_of[0] else None
     stack = Stack(made_of, _mixer(controls, live, maximum) if same is None else same.mixer)
     kept = Kept() if same is None else same.kept
@@ -439,7 +449,7 @@ _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": 
 
 
 def problems(controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene) -> list[str]:
-    """Sentences on layers that cannot be played.
+    """Sentences on layers and reactions that cannot be played.
 
     Args:
         controls: the original (not evaluated) control armature of the character.

@@ -54,7 +54,10 @@ def _still(
 ) -> object:
     """A property that cannot have keys or drivers, because it lacks the option ANIMATABLE.
 
-    Args: kind  function of bpy.props that makes the property, given  arguments of this function.
+    Args:
+        kind: function of bpy.props that makes the property.
+        options: options of the property.
+        given: further arguments of `kind`.
     """
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 

@@ -75,7 +75,8 @@ def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bo
 def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) -> logic.Span:
     """The timing of an action in a layer: start, played frames, speed and warp points.
 
-    Without `action`, the action of the layer is used.
+    Without `action`, the action of the layer is used. A single warp point has no effect; two or
+    more replace the speed.
     """
     first, last = (action or layer.action).frame_range
     points = sorted((point.frame, point.source) for point in layer.warp)
@@ -168,7 +169,7 @@ def _free_name(name: str, taken: Collection[str]) -> str:
 def add_action(
     controls: ArmatureObject, action: bpy.types.Action, **settings: object
 ) -> RISORIUS_PG_layer:
-    """Add a layer that plays an action at the frames of its keys.
+    """Add a layer that plays an action at the frames of the action.
 
     Args:
         controls: control armature of the character.
@@ -258,6 +259,9 @@ def _rank(there: Sequence[RISORIUS_PG_layer]) -> None:
 def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
     """Add a copy of a layer directly above this layer, and copy the keys of its weight.
 
+    Keys in linked actions, keys in actions that another datablock uses too, and a driver of the
+    weight are not copied.
+
     Args:
         controls: control armature of the character.
         place: index of the layer, from place_of.
@@ -325,12 +329,12 @@ def copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
 def keep_weights(controls: ArmatureObject, before: bpy.types.Action | None) -> None:
     """Copy the keys of layer weights from the earlier action to the active action.
 
-    If there is no active action, a new action is made. A weight that has keys in the active action
-    keeps them.
+    If there are such keys but no active action, a new action is made. A weight that has keys in the
+    active action keeps them.
 
     Args:
         controls: control armature.
-        before: the earlier active action, or None.
+        before: the earlier active action; None: nothing is copied.
     """
     old = compat.bag_for(before, controls) if before is not None else None
     curves = [c for c in old.fcurves if c.data_path.startswith(logic.COLLECTION)] if old else []

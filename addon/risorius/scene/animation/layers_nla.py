@@ -22,8 +22,9 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     """Convert layers to strips, bottom to top, up to the first layer that no strip can represent.
 
     This layer and all layers above it stay, because Blender evaluates the NLA before all layers.
-    Muted layers are skipped, and beside solo layers all others. Converted layers are muted. The
-    active action becomes the lowest new strip.
+    Muted layers are skipped; if there are solo layers, all other layers are skipped too. Converted
+    layers are muted. If at least one layer is converted, the active action becomes the lowest new
+    strip.
 
     Args:
         scene: gives the frame rate.
@@ -220,7 +221,14 @@ def _masked(
 
 
 def _is_left_out(path: str, allowed: Set[str]) -> bool:
-    """Whether the mask of a layer excludes an F-curve."""
+    """Whether the mask of a layer excludes an F-curve.
+
+    A rotation of a bone is excluded only if the mask excludes all its angles.
+
+    Args:
+        path: data path of the F-curve.
+        allowed: allowed data paths of sliders, and allowed names from `clip_units.BONES`.
+    """
     for bone, names in clip_logic.TURNS.items():
         if path.startswith(f'pose.bones["{bone}"].rotation_'):
             return not allowed & set(names)

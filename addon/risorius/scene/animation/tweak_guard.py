@@ -80,12 +80,13 @@ _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
 # Session uid of a control armature whose action was checked since load or undo -> its cached pose
 # without the tweak, or None.
 _known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
-# Session uid of a control armature -> reason why the tweak could not store the last key.
+# Session uid of a control armature -> reason why the tweak could not store the last key or moved
+# control.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
 
 def trouble(controls: ArmatureObject) -> str:
-    """The reason why the tweak could not store the last key; "" if it could.
+    """The reason why the tweak could not store the last key or moved control; "" if it could.
 
     Args: controls  a control armature.
     """
@@ -201,7 +202,8 @@ def _strips(controls: ArmatureObject) -> tuple[object, ...]:
 def settle(controls: ArmatureObject) -> None:
     """Store in the tweak the controls that were moved without a key.
 
-    Nothing is stored if they were moved at a frame outside the tweak.
+    Nothing is stored if they were moved at a frame outside the tweak, or if the tweak is too weak
+    there for a large rotation; `trouble` then gives the reason.
 
     Args:
         controls: a control armature. The scene may have changed its frame since the move.
@@ -391,7 +393,10 @@ def _restore(
     before: bpy.types.FCurve | None,
     frames: list[float],
 ) -> None:
-    """Restore the keys that a curve had in `before`; remove the curve if `before` is None."""
+    """Restore the keys that a curve had in `before`; remove the curve if `before` is None.
+
+    Interpolation and types of keys are restored only at `frames`, the frames of inserted keys.
+    """
     if before is None:
         bag = compat.bag_for(action, controls)
         if bag is not None:
@@ -414,7 +419,11 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """The controls that differ from the pose without the tweak; None if none does."""
+    """The controls that differ from the pose without the tweak; None if none does.
+
+    Sliders with drivers are left out. If the face board leads, its handles are compared instead of
+    the sliders.
+    """
     rig = parts.rig_of(controls)
     if rig is None:
         return None

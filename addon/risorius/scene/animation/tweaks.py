@@ -159,7 +159,8 @@ def take(
 ) -> int:
     """Store edited sliders and bones in the tweak at a frame.
 
-    The sliders and bones are then reset to the values of the keys below the tweak.
+    The sliders and bones are then reset to the values of the keys below the tweak. If the face
+    board leads, all sliders that moved handles change are stored too, and the handles are reset.
 
     Args:
         controls: control armature with an active tweak.
@@ -322,7 +323,14 @@ def _rows_of(curves: Curves, path: str) -> list[bpy.types.FCurve | None]:
 def _insert(
     controls: ArmatureObject, tweak: Tweak, rows: Mapping[str, Sequence[float]], frame: float
 ) -> None:
-    """Insert keys into the layer of a tweak. Args: rows  components by data path."""
+    """Insert keys into the layer of a tweak.
+
+    Args:
+        controls: the control armature.
+        tweak: the active tweak; its layer is made if it does not exist.
+        rows: data path -> value of each component.
+        frame: frame of the scene.
+    """
     layer = _layer(controls, tweak)
     action = layer.action
     bag = compat.bag_for(action, controls)
@@ -453,8 +461,14 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
 
 
 def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
-    """Slider -> change of its value by moved handles, if the face board leads. The handles return
-    to the pose without the tweak."""
+    """Slider -> change of its value by moved handles; empty unless the face board leads.
+
+    The handles return to the pose without the tweak.
+
+    Args:
+        controls: the control armature.
+        below: the pose without the tweak.
+    """
     rig = parts.rig_of(controls)
     if rig is None or not board.leads_face(rig):
         return {}
@@ -464,7 +478,7 @@ def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
 
 
 def _layer(controls: ArmatureObject, tweak: Tweak) -> layer_properties.RISORIUS_PG_layer:
-    """The layer of a tweak; created if it does not exist."""
+    """The layer of a tweak; a new one is made if it does not exist or has lost its action."""
     found = _layer_of(controls, tweak)
     if found is not None and found.action is not None:
         return found

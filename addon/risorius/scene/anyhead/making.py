@@ -56,7 +56,7 @@ class Template(NamedTuple):
     path: str = ""
 
     def load(self) -> native.Dna:
-        """Load the template face, unless it is a face of the scene.
+        """The face as a Dna: the face of the scene, or else the face in the file, which is read.
 
         Raises:
             DnaError: the file is not a DNA file.

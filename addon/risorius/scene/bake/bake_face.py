@@ -127,7 +127,8 @@ def bake(
         options: range, kind and parts of the bake.
 
     Yields:
-        The progress, 0 to 1. No character changes before the last value.
+        The progress, 0 to 1. Until the last value, only previews of channels are ended; the
+            characters do not change otherwise.
 
     Returns:
         Sentences for a report, one for each character.

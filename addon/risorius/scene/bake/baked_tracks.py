@@ -51,7 +51,9 @@ def rig_tracks(
     wanted: Collection[str],
     target: ArmatureObject | None = None,
 ) -> list[Track]:
-    """Tracks of the deforming armature. The target gets the values of the first frame.
+    """Tracks of the deforming armature.
+
+    Bones and arrays that the rig writes get the values of the first frame in the target.
 
     Args:
         rig: the character's deforming armature.

@@ -26,7 +26,10 @@ _WITH_NODES = (
 
 
 def owners() -> Iterator[bpy.types.ID]:
-    """Every datablock that can have drivers, including node trees inside other datablocks."""
+    """Every datablock of this .blend, and the node trees inside datablocks.
+
+    Every driver belongs to one of them; not all of them can have drivers.
+    """
     for kind in bpy.data.bl_rna.properties:
         if kind.type != "COLLECTION":
             continue

@@ -51,14 +51,18 @@ LANDMARKS = "risorius_landmarks"  # on a collection: marks it as container of he
 REAL = "risorius_real"  # on a Key of a LIVE mesh: channels that have a shape key of their own
 KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: channel -> name given by the user
 KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: channels in the user's order of keys
-CHANNEL_VARIABLE = "risorius_channel"  # driver variable that identifies keys of the add-on
+# Name of the driver variable by which the add-on recognises its shape keys of single channels.
+CHANNEL_VARIABLE = "risorius_channel"
 TEST = (
     "risorius_test"  # on the deforming armature: a channel's test override, see channel_preview.py
 )
 LOOK = "risorius_look"  # on the deforming armature: solo and mute settings, see look_masks.py
-HEAT = "risorius_heat"  # on the rig: kind of its heat map; on meshes: name of the colour attribute
+# On the rig: kind, largest motion and contents of its heat map. A colour attribute of the coloured
+# meshes has this name too.
+HEAT = "risorius_heat"
 HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with a heat map: colour attributes active before
-BAKED = "risorius_baked"  # on rig or controls: settings of a bake; a rig with it is not live
+# On rig or controls: settings of a bake. The evaluator skips a rig that has this property.
+BAKED = "risorius_baked"
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature with the control properties

@@ -152,7 +152,7 @@ def adopt(ends: Sequence[End], *functions: Callable[..., object]) -> None:
 
 
 def at(*ends: End) -> Callable[[Function], Function]:
-    """Decorator: call a function without arguments at events, to release its resources.
+    """Decorator: call the decorated function at events, to release resources.
 
     Args:
         ends: events at which the function is called; at `unregister` too, unless `quit` is given.

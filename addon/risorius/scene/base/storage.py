@@ -120,7 +120,7 @@ def content(text: object) -> bytes:
     """The bytes of the DNA file in a Text.
 
     Raises:
-        ContentError: the bytes were changed or damaged, or `text` is not a Text.
+        ContentError: the bytes were changed or damaged, or `text` is not a Text with a DNA file.
     """
     packed = text.get(_BYTES) if isinstance(text, bpy.types.Text) else None
     if not isinstance(text, bpy.types.Text) or not isinstance(packed, bytes):

@@ -180,6 +180,8 @@ def build_rig(
 def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
     """Add a driver to the rig so that Blender evaluates the controls even if they are hidden.
 
+    If the rig has this driver already, its variables are only pointed at `controls`.
+
     Blender skips hidden objects that no visible object depends on, and the face would not move. The
     driver reads each control bone, because Blender evaluates a bone of a hidden armature only if
     something visible depends on this bone.

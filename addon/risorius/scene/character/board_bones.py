@@ -126,6 +126,8 @@ def remove(context: Context, rig: ArmatureObject) -> int:
 def corners(controls: ArmatureObject) -> NDArray[np.float64]:
     """float64[N, 3] in world space: the corners of a face board's border.
 
+    If the border has no custom shape, its origin is the only point.
+
     Args:
         controls: control armature with the board.
     """
@@ -151,7 +153,8 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 def _sideways(live: runtime.Runtime) -> dict[int, float]:
     """GUI control -> joint motion along +x, divided by the length of the motion; -1 to 1.
 
-    The motion is summed over all joints; +x is the left side of the face. Only controls that move
+    The motion from rest to the control's highest value is summed over all joints; +x is the left
+    side of the face. Only controls that move
     the middle of the face sideways are included. Their names do not define the direction, because
     "left" in jawLeft may mean the viewer's left.
     """
@@ -273,7 +276,14 @@ def _build(
 
 
 def _dress(controls: ArmatureObject, layout: Board, names: Sequence[str], unit: float) -> None:
-    """Set shapes, colours, limits and locks of the new bones. Args: names  of these bones."""
+    """Set shapes, colours, limits and locks of the new bones.
+
+    Args:
+        controls: control armature with the bones.
+        layout: the whole board.
+        names: names of the new bones.
+        unit: Blender units per board unit, the scale of the bone `board`.
+    """
     name = controls.name.removesuffix("_controls")
     disc: bpy.types.Object | None = None
     for bone in controls.pose.bones:

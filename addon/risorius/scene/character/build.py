@@ -32,7 +32,7 @@ class BuildOptions:
         textures: whether to load textures from the folders near the file and from texture_folder.
         texture_folder: folder to search first; "": none.
         simple_materials: whether to make materials without subsurface, relief and animated maps.
-        unit: metres per Blender unit; None: the scene's unit.
+        unit: metres per Blender unit; None or 0: the scene's unit.
         nearest_lods: whether to build the finest level of the DNA file if it has none of `lods`.
     """
 

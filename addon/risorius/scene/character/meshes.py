@@ -271,7 +271,8 @@ def edits_of(
         deltas: (vertex indices, float32[K, 3]) of the key's channel in the DNA file.
 
     Returns:
-        bool[V], whether a vertex was edited, and float64[V, 3] offsets, see user_edits.key_edits.
+        bool[V], whether a vertex was edited, and float64[V, 3], the offset of each edited vertex
+        from the unedited shape key; 0 elsewhere.
     """
     base = points_of(block.relative_key)
     return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))

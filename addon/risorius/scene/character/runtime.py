@@ -44,7 +44,8 @@ class Runtime:
         owned: indices of the joints that the evaluator writes.
         rest: float64[J, 4, 4], world matrices of the neutral joints in Blender's units.
         anchors: joints of neck, head and eyes.
-        look: side "L" or "R" -> (index of a look control, yaw, pitch) in radians at value 1.
+        look: side "L" or "R" -> for each look control of this eye: (index of the raw control, yaw
+            and pitch of the eye in radians at value 1).
         lids: name such as eyeBlinkL or eyeWidenR -> index of the raw control.
         turning: joints whose rotation is stored in raw controls.
         morphs: cache, mesh index -> risorius.Morph.
@@ -232,7 +233,8 @@ def there(rig: ArmatureObject, board: str | None = None) -> Runtime:
     """The Runtime of a character; the caller must have checked that `of` gives one.
 
     Args:
-        rig, board: see `of`.
+        rig: the deforming armature.
+        board: PRIMARY or COMPLETE; None: the kind of the character's board.
     """
     live = of(rig, board)
     assert live is not None
@@ -286,7 +288,10 @@ def unit_of(rig: ArmatureObject) -> float:
 
 
 def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
-    """Drop compiled data of deleted characters. Args: rigs  deforming armatures that exist."""
+    """Drop compiled data of deleted characters, and forget the last written values of all.
+
+    Args: rigs  deforming armatures that exist.
+    """
     used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
     for key in [k for k in _cache if k[0] not in used]:
         del _cache[key]

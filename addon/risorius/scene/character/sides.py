@@ -147,7 +147,7 @@ def copy_across(rig: ArmatureObject, from_left: bool, region: str = "") -> int:
         region: name of the region to copy; "": all regions.
 
     Returns:
-        The number of sliders that were set.
+        The number of sliders that were set or passed to the board.
     """
     values = values_of(rig, region)
     return put(rig, slider_rows.across_from(values, native.regions(), from_left))

@@ -48,7 +48,7 @@ class Hit:
 
 
 def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
-    """The vertex at which a ray meets a face.
+    """The vertex of a face that is nearest to the place where a ray meets the face.
 
     None if the ray meets nothing, or first another object, an instance of a face, a mesh of another
     level of detail, or a place far from all vertices.

@@ -50,7 +50,7 @@ class Skin:
 
     @classmethod
     def of(cls, context: Context, rig: ArmatureObject, live: runtime.Runtime) -> Skin:
-        """Collect the visible meshes of a character.
+        """The Skin of a character, at the level of detail that the viewport shows.
 
         Args:
             context: has the visible scene.

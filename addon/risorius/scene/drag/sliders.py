@@ -173,7 +173,12 @@ def mirrored_indices(live: runtime.Runtime) -> NDArray[np.int64]:
 
 
 def of_region(live: runtime.Runtime, region: str) -> NDArray[np.bool_]:
-    """bool[R]: whether a raw control is in a region. Args: live  Runtime, region  name."""
+    """bool[R]: whether a raw control is in a region.
+
+    Args:
+        live: Runtime of the character.
+        region: name of the region.
+    """
     of_slider = native.regions().of_slider
     return np.array([of_slider(label) == region for label in live.labels], bool)
 

@@ -44,7 +44,8 @@ class Options:
             or "transpose": all sliders, in proportion to their effect on the points.
         single: move only the best control; with `symmetric` also its partner on the other side.
         choice: with `single`: 0: the best control, 1: the second best, and so on.
-        region: use only controls of the region of the point.
+        region: use only controls of one region: the region of the control that moves the dragged
+            point most.
         others: points that move together with the dragged point.
     """
 
@@ -116,7 +117,7 @@ class Stroke:
 
     @property
     def dragged_region(self) -> str:
-        """The region of the control that moves the point most."""
+        """The region of the control that moves the point most, of those that the drag may move."""
         strongest = int(np.argmax(np.linalg.norm(self.reach, axis=0) * self.state.free))
         return native.regions().of_slider(self.live.labels[strongest])
 
@@ -130,6 +131,10 @@ class Stroke:
 
         Returns:
             float64[3]: the reached position in world space.
+
+        Raises:
+            FaceError: the face is a library override that Blender does not allow to change; the
+                sliders are then restored.
         """
         self.raw, predicted = self._solve(target - self._apart, view, self._free(target, view))
         sliders.write(self.rig, self.live, self.state, self.raw)
@@ -149,6 +154,10 @@ class Stroke:
 
         Returns:
             The names of the moved sliders.
+
+        Raises:
+            FaceError: as by `to`, or an active tweak does not include the current frame. The
+                controls then have their values from before the drag.
         """
         self.to(context, target, view)
         change = np.abs(self.raw - self.state.seen)

@@ -45,8 +45,8 @@ class _Work:
 
 
 _work = session.keep("handlers.work", _Work, ("unregister",))
-# Session uids of known objects, of known control armatures, and of deforming armatures that were
-# repaired since the last update.
+# Session uids. _objects: known objects of the file; empty after load and undo. _faces: known
+# control armatures. _mended: deforming armatures that were repaired since the last update.
 _objects = session.value("handlers.objects", frozenset[int](), ("undo", "load"))
 _faces = session.value("handlers.faces", frozenset[int](), ("unregister",))
 _mended: set[int] = session.keep("handlers.mended", set, ("load",))
@@ -196,11 +196,11 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters to evaluate after an update.
+    """The characters to evaluate after an update; edits are also recorded for layers and tweaks.
 
-    Their armatures, their body, an action of one of their layers, or the camera was updated.
-
-    The body of a character is the armature to which its face is attached.
+    Of such a character, the control armature, the body (the armature to which the face is attached)
+    or an action of a layer was updated; or the deforming armature was updated, and was moved or has
+    joints that something reads; or the camera was updated, and chooses the level of detail.
     """
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera

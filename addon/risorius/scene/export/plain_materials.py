@@ -75,7 +75,7 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
     Args:
         override: context override of the export, from export_animation.copies.
         loans: lent_names.Loans for the names of the materials.
-        size: width and height of baked images in pixels.
+        size: width and height of baked images in pixels; images of roughness alone are smaller.
 
     Yields:
         The progress, 0 to 1.
@@ -214,6 +214,11 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
     """Write UV coordinates of some corners into the UV map for baking.
 
     A missing UV map for baking is created as a copy of the UV map that is active for rendering.
+
+    Args:
+        mesh: the copied mesh.
+        corners: int64[n], indices of the corners.
+        part: float32[n, 2], their UV coordinates.
     """
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)
@@ -232,7 +237,7 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
 def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
     """Copy the coordinates of the UV map for baking into the UV map that is active for rendering.
 
-    The UV map for baking is then removed.
+    The UV map for baking is then removed. If it is the only UV map, it stays as "UVMap" instead.
     """
     layer, shown = mesh.uv_layers.get(_LAYER), _shown_layer(mesh)
     if layer is None:
@@ -258,7 +263,7 @@ def _bake(
         override: context override of the export.
         items: the copied meshes.
         flats: their materials.
-        size: width and height of baked images in pixels.
+        size: width and height of baked images in pixels; images of roughness alone are smaller.
     """
     _prepare(override["scene"], size)
     spare = bpy.data.images.new("Spare", 4, 4)

@@ -21,8 +21,8 @@ class Sound:
 
     Attributes:
         path: path of the sound file.
-        offset: seconds from the first exported frame to the start of the strip; below 0 if the
-            strip starts earlier.
+        offset: seconds from the first exported frame to the frame at which the untrimmed sound file
+            begins; below 0 if the file begins earlier.
     """
 
     path: Path

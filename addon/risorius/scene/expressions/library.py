@@ -101,6 +101,8 @@ def all_items(where: Path) -> tuple[dict[str, Item], list[str]]:
 def of_folder(where: Path) -> tuple[list[tuple[Path, native.Expression]], list[str]]:
     """(path, expression) pairs of a library, and a sentence for each unusable file.
 
+    Only the first _MOST files in the order of their names are read.
+
     Args:
         where: the folder; a missing folder gives no expressions and one sentence.
     """

@@ -136,6 +136,9 @@ def draw_places(sitter: Sitter, placed: Sequence[Floats], size: int = SIZE) -> F
         sitter: the face.
         placed: vertices of each piece, from `places`.
         size: width and height in pixels.
+
+    Returns:
+        float64[size, size, 3] in [0, 1], row 0 at the bottom.
     """
     view, scale = _frame(sitter)
     high = size * _SMOOTH
@@ -306,8 +309,12 @@ class _Picture:
 
 
 def _in_sight(corners: Floats, high: int) -> Ints:
-    """Indices of the finite triangles that may overlap the picture. Args: corners  float64[F, 3, 3]
-    in pixels; high  height of the picture."""
+    """Indices of the finite triangles that may overlap the picture.
+
+    Args:
+        corners: float64[F, 3, 3] in pixels, the corners of the triangles.
+        high: height of the picture in pixels.
+    """
     low, top = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
     inside = (top >= 0).all(axis=1) & (low <= high - 1).all(axis=1)
     return np.flatnonzero(inside & np.isfinite(corners).all(axis=(1, 2)))

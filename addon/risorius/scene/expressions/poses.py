@@ -96,7 +96,7 @@ def apply(
         present: values to start from; None: the current values.
 
     Returns:
-        The property names of the sliders that were set.
+        The property names of the sliders that the blend sets, also of linked sliders, which stay.
 
     Raises:
         LibraryError: the expression was made for another rig; nothing was moved.

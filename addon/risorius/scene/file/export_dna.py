@@ -47,8 +47,8 @@ def export(
         options: kinds of edits to write; None: all.
 
     Returns:
-        The bytes, and sentences about the changes with their sizes. Without edits the bytes equal
-        the imported file.
+        The bytes, and sentences about the changes with their sizes, which are also written to a
+        Text and to the console. Without edits the bytes equal the imported file.
 
     Raises:
         ExportError: the polygons of a mesh differ from the DNA file, a mesh is in edit mode, or the

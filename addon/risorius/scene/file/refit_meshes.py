@@ -150,7 +150,7 @@ def _refit(
 
 
 class _Nothing:
-    """Transfer from a mesh without polygons: nothing is carried over."""
+    """Transfer from a mesh without polygons: values become 0; vertex indices stay if they exist."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -364,6 +364,8 @@ def _refit_corners(
 ) -> None:
     """Update UVs, normals and the materials' attributes if the old and the new file differ.
 
+    A UV map that the user edited stays.
+
     Args:
         change: the replacement.
         item: the existing mesh object.
@@ -494,7 +496,7 @@ def _refit_shape(
 
 
 def _added(points: NDArray[np.float32], moves: NDArray[np.float64]) -> NDArray[np.float32]:
-    """float32 positions plus moves; positions with a move of 0 stay bit-identical."""
+    """float32[V, 3]: positions plus moves; positions with a move of 0 stay bit-identical."""
     result = points.copy()
     rows = np.any(moves != 0, axis=1)
     result[rows] = (points[rows].astype(np.float64) + moves[rows]).astype(np.float32)

@@ -48,7 +48,8 @@ def replace_file(
         progress: function that is called with the progress, 0 to 1.
 
     Returns:
-        Sentences about new parts, removed parts, and the user's additions.
+        Sentences about new parts, removed parts, and the user's additions. They are also written to
+        a Text and to the console.
 
     Raises:
         ReplaceError: the character cannot be changed now.

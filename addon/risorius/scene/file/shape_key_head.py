@@ -35,13 +35,16 @@ def usable_head(item: bpy.types.Object | None) -> bool:
 
 
 def head_of(context: Context) -> MeshObject | None:
-    """The active object if it is a usable head, else the first usable selected object, or None."""
+    """The active object if `usable_head` accepts it, else the first selected object it accepts.
+
+    None if it accepts no such object.
+    """
     there = [context.active_object, *context.selected_objects]
     return next((cast(MeshObject, item) for item in there if usable_head(item)), None)
 
 
 def taken_with(context: Context, head: MeshObject) -> list[MeshObject]:
-    """The head and all other selected meshes that are no part of a face.
+    """The head and all other selected meshes with polygons that are no part of a face.
 
     Args:
         context: has the selection.
@@ -98,8 +101,9 @@ def shapes_of(
         item: mesh object of the head with shape keys.
         others: meshes that belong to the head: teeth, eyes, hair.
         height_mm: the head is scaled to this height from chin to top of the head; 0: no scaling.
-        said: name of a shape key -> the user's meaning: a raw control without prefix, "=" and an
-            ARKit unit, "@" and an expression, or a list of raw controls; [] leaves the key out.
+        said: name of a shape key -> the meaning that the user chose: the name of a raw control
+            without prefix, "=" followed by the name of an ARKit unit, "@" followed by the name of
+            an expression, or a list of raw controls; [] leaves the key out.
 
     Raises:
         HeadError: the shape keys are not relative, or the mesh has no polygons.
@@ -266,7 +270,9 @@ def rig_task(
     wishes: RigWishes,
     said: Mapping[str, str | list[str]] | None = None,
 ) -> Task[Rigged]:
-    """A task that makes a joint rig and writes its DNA file; if cancelled, it writes no file.
+    """A task that makes a joint rig and writes its DNA file and expressions.
+
+    A cancelled task writes no file.
 
     Args:
         shapes: the head and its shapes, from shapes_of.
@@ -346,7 +352,9 @@ def joint_rig(
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:
     """Give the meshes of LOD 0 the materials of the objects that the face was made from.
 
-    The new meshes and these objects must have the same polygons in the same order.
+    A new mesh must have the polygons of its object, or the part of them that the face uses, in the
+    same order. They may be repeated, as a Mirror modifier repeats them. If the numbers of polygons
+    do not fit, the mesh is skipped.
 
     Args:
         meshes: mesh objects of the new face.

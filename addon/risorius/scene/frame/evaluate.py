@@ -91,7 +91,7 @@ def is_paused() -> bool:
 
 
 def evaluate_all(depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> None:
-    """Evaluate all characters of this file and write their poses.
+    """Evaluate all characters of this file and write their poses; does nothing while `paused`.
 
     Args:
         depsgraph: the evaluated dependency graph to read from.
@@ -207,7 +207,15 @@ def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
 
 
 def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bool:
-    """Whether a character's controls are equal before and after the evaluation of the frame."""
+    """Whether a character's controls are equal before and after the evaluation of the frame.
+
+    False also if other inputs move the face, or if only one of both evaluations is for a render.
+
+    Args:
+        rig: deforming armature.
+        done: the work done before the frame.
+        depsgraph: graph after the evaluation of the frame.
+    """
     controls = parts.controls_of(rig)
     if done.glance is None or controls is None:
         return False

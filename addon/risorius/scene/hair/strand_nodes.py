@@ -147,7 +147,13 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
 
 
 def _lines(g: _Tree, count: int, rows: int) -> Node:
-    """Straight curves with one point per row of a card. Args: count  number of curves."""
+    """Straight curves with one point per row of a card.
+
+    Args:
+        g: the tree.
+        count: number of curves.
+        rows: rows of vertices per card.
+    """
     line = g.node("GeometryNodeCurvePrimitiveLine")
     line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
     dots = g.node("GeometryNodePoints", {"Count": count})

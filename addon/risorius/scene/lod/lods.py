@@ -24,7 +24,12 @@ def levels_of(item: MeshObject) -> list[int]:
 
 
 def shows(item: MeshObject, level: int) -> bool:
-    """Whether a level shows a mesh; a mesh without levels is always shown. Args: item the mesh."""
+    """Whether a level shows a mesh; a mesh without levels is always shown.
+
+    Args:
+        item: the mesh object.
+        level: number of the level.
+    """
     return parts.LODS not in item or level in levels_of(item)
 
 
@@ -74,8 +79,11 @@ def show(rig: ArmatureObject, viewport: int | None = None, render: int | None = 
 
 
 def distances(rig: ArmatureObject) -> list[float]:
-    """Camera distances in Blender units at which each level changes to the next one. Args: rig
-    deforming armature."""
+    """Camera distances in Blender units at which each level changes to the next one.
+
+    Args:
+        rig: the deforming armature.
+    """
     return saved.numbers(rig, parts.LOD_DISTANCES, 0.0)
 
 

@@ -157,7 +157,13 @@ def _gray(graph: Graph, value: Value) -> Socket:
 
 
 def _film(graph: Graph, look: Look, low: float, high: float) -> Socket:
-    """Uneven wetness: a roughness that noise varies between two values."""
+    """Uneven wetness: a roughness that noise varies between two values.
+
+    Args:
+        graph: Graph of the material.
+        look: Look of the mesh.
+        low, high: the two values, 0 to 1.
+    """
     uneven = graph.noise(graph.rest_points(look.extent), 14.0 / look.unit, detail=3.0)
     return graph.math("MULTIPLY_ADD", uneven, high - low, low)
 

@@ -64,7 +64,8 @@ class Look:
         """The image that the mesh uses for a role, or None.
 
         Args:
-            role: purpose of a texture, such as "color", "cavity" or "normal:2", see texture_search.
+            role: purpose of a texture, such as "color", "cavity" or "normal:2" (the normals of
+                wrinkle set 2); texture_search.TexturePlan lists all roles.
             data: whether the pixels are numbers instead of colours.
         """
         return self.images.load(self.found.of(self.base, role), data)

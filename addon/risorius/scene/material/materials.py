@@ -235,6 +235,11 @@ def _add_border(
     """Write an attribute: 1 at an open border away from the face, falling to 0 with distance.
 
     A mesh without such a border gets no attribute.
+
+    Args:
+        mesh: the mesh of a skin.
+        points: float32[V, 3], its vertices in Blender units.
+        frame: place and size of the face.
     """
     edges = np.empty(2 * len(mesh.edges), np.int32)
     mesh.edges.foreach_get("vertices", edges)

@@ -365,7 +365,8 @@ class Skin:
         """The normal from the normal textures; None if there are none.
 
         The normals of the texture sets are mixed into the normal of the base texture; the
-        amount of each set is its factor.
+        amount of each set is its factor. If a texture stores differences around 0.5, the scaled
+        differences are added instead.
         """
         graph, look = self.graph, self.look
         base = look.image("normal", data=True)

@@ -46,6 +46,10 @@ def read(path: str) -> native.Dna:
 
     Args:
         path: absolute path of the file.
+
+    Raises:
+        DnaError: the file is not a DNA file.
+        OSError: the file cannot be read.
     """
     stat = Path(path).stat()
     stamp = (stat.st_mtime, stat.st_size)

@@ -70,7 +70,9 @@ def of(rig: ArmatureObject) -> Heat | None:
 
 
 def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Heat:
-    """Colour the meshes of a character.
+    """Colour the meshes of a character, and let the 3D views show the colours.
+
+    The choice is stored on the deforming armature, and a timer updates the colours from then on.
 
     Args:
         rig: its deforming armature.
@@ -243,7 +245,11 @@ def take_away() -> None:
 
 
 def give_back(depsgraph: Depsgraph) -> None:
-    """Restore the heat maps that `take_away` removed. Args: depsgraph  graph to read layers."""
+    """Restore the heat maps that `take_away` removed.
+
+    Args:
+        depsgraph: graph from which animation layers are read.
+    """
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)
         if kept is not None:
@@ -274,7 +280,9 @@ def follow_undo() -> None:
 
 
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
-    """Update the colours of a character if its pose has changed. Returns: whether the pose changed.
+    """Update the colours of a character if its pose, LOD, solo or mute changed.
+
+    The colours of a CONTROL depend on the LOD alone. Returns: whether an update was necessary.
 
     Args:
         rig: its deforming armature, with a heat map.

@@ -74,7 +74,11 @@ def of(item: MeshObject) -> Names:
 
 
 def said_of(item: MeshObject) -> dict[str, Said]:
-    """The user's assignments: name of the key -> assignment. Args: item any mesh."""
+    """The user's assignments: name of the key -> assignment.
+
+    Args:
+        item: any mesh object; without assignments the result is empty.
+    """
     return dict(_parsed(saved.text(item.data, parts.NAMES)))
 
 

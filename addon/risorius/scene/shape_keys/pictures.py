@@ -216,7 +216,11 @@ def _marked(colors: Floats, length: Floats, triangles: Ints, furthest: float) ->
 
 
 def sample_path(value: str) -> Path:
-    """The picture file of a possible assignment. Args: value of an assigned.Choice."""
+    """The picture file of a possible assignment.
+
+    Args:
+        value: the member `value` of an assigned.Choice.
+    """
     shown = sorted(assigned.weights_of(value).items())  # jawOpen and =jawOpen are one picture
     text = f"sample {VERSION} {portrait.VERSION} {native.addon_version()} {shown}"
     return _file(_digest(text.encode()))
@@ -246,7 +250,13 @@ def sample_sitter() -> portrait.Sitter | None:
 
 
 def _draw_sample(sitter: portrait.Sitter, rest: Sequence[Floats], value: str) -> Floats:
-    """Draw the sample man with an assignment. Args: rest portrait.places of the neutral face."""
+    """Draw the sample man with an assignment; moving parts are orange.
+
+    Args:
+        sitter: the sample man.
+        rest: portrait.places of his neutral face.
+        value: the member `value` of an assigned.Choice.
+    """
     placed = portrait.places(sitter, assigned.weights_of(value))
     lengths = [np.linalg.norm(a - b, axis=1) for a, b in zip(placed, rest, strict=True)]
     furthest = max(float(length.max(initial=0.0)) for length in lengths)

@@ -313,7 +313,11 @@ def look_at_tagged(scene: bpy.types.Scene) -> None:
 
 
 def stale(rig: ArmatureObject) -> bool:
-    """Whether the plan of a face is outdated. Args: rig deforming armature."""
+    """Whether the plan of a face is outdated; False if there is no plan.
+
+    Args:
+        rig: the deforming armature.
+    """
     kept = _kept.get(rig.session_uid)
     return kept is not None and not kept.is_fresh
 

@@ -81,7 +81,7 @@ class Spoken(Protocol):
 
 
 def of(action: bpy.types.Action) -> Spoken:
-    """The voice of an action. Args: action  any; without a voice the list of sounds is empty."""
+    """The voice of an action; if the action has none, the list of sounds is empty."""
     return cast(Spoken, getattr(action, PROPERTY))
 
 

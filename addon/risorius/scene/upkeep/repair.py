@@ -20,6 +20,8 @@ from ..character import armatures, build, meshes, runtime
 def heal(rig: ArmatureObject) -> list[str]:
     """Restore the names of control bones, and missing sliders or sliders of a wrong type.
 
+    The pointer of the control armature to the rig is restored too.
+
     Args:
         rig: the character's deforming armature, which is not linked.
 
