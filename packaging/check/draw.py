@@ -111,7 +111,7 @@ def declaration(lines: list[str], number: int) -> str:
     out = ""
     for line in lines[number : number + 8]:
         out += " " + line.partition(" //")[0]
-        if out.count("(") <= out.count(")"):
+        if out.count("(") <= out.count(")") and not line.strip().startswith("template"):
             break
     return one_line(out)
 
@@ -167,7 +167,8 @@ def blocks(path: Path, lines: list[str], about: str, mark: str) -> Iterator[Item
         if is_comment and start is None:
             start = number
         if not is_comment and start is not None:
-            text = "\n".join(part.strip().lstrip("/#!<").rstrip() for part in lines[start:number])
+            prose = [part for part in lines[start:number] if "SPDX" not in part]
+            text = "\n".join(part.strip().lstrip("/#!<").rstrip() for part in prose)
             if len(text.split()) > 3 and not _NOT_PROSE.match(text.strip()):
                 yield f"{place_of(path)}:{start + 1}", about, line.strip(), text
             start = None
