@@ -21,6 +21,9 @@ _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 # Fractions of the rim's displacement by which the eight rings (OUTER) outside the rim move, the
 # nearest first.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
+# Fraction of the data's blink by which the skin around the lids moves. The lids' own fraction
+# depends on how far the data's lids are shut, which the rest pose does not show.
+_AROUND = 0.55
 _STEPS = 10  # iterations that lay the rim on the eye
 # mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
 # round the ball, so without this distance they would be inside the ball at half of the look.
@@ -248,7 +251,9 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
             before[ROOT + 2, column], way[ROOT + 2, column], closed[ROOT + 2, edge]
         )
     share = _even(share, np.abs(way[ROOT + 2, :, 1]) > 2 * MM)
-    whole = before + share[:, None] * way
+    rows = np.ones((len(closed), 1))
+    rows[:ROOT, 0] = np.linspace(0, 1, ROOT) ** 2
+    whole = before + (_AROUND + rows * (share - _AROUND))[:, :, None] * way
     for row in range(ROOT, ROOT + 4):
         x = whole[row, UPPER, 0]
         line = closed[row, edge]
@@ -259,9 +264,10 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     off = closed[ROOT, UPPER] - whole[ROOT, UPPER]
     outer = whole[:ROOT, UPPER] + _FADE[::-1, None, None] * off
     closed[:ROOT, UPPER] = outer
+    closed[:, LOWER] += (_AROUND * (1 - rows))[:, :, None] * way[:, LOWER]
     closed[ROOT + 4, UPPER] = whole[ROOT + 4, UPPER]
     closed = lids.seated(closed)
-    plain = _scaled(lids, blink, share)
+    plain = _scaled(lids, blink)
     out = plain.copy()
     out[lids.rings] = closed - lids.grid(lids.rest)
     return out, plain
@@ -303,7 +309,7 @@ def _even(share: Floats, known: Floats) -> Floats:
     return np.asarray((np.roll(out, 1) + 2 * out + np.roll(out, -1)) / 4)
 
 
-def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
+def _scaled(lids: Lids, blink: Floats) -> Floats:
     """float64[V, 3]: the shortened blink from the rest pose, for skin outside the grid.
 
     The returned displacement also undoes the one that opened the lids to their rest pose.
@@ -311,15 +317,9 @@ def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
     Args:
         lids: the lids in their rest pose.
         blink: float64[V, 3], the data's displacement.
-        share: float64[COLUMNS], the fraction of `blink` that is used.
     """
-    out = np.zeros_like(blink)
-    moved = np.flatnonzero(np.abs(blink).max(axis=1) > 1e-7)
-    ring = lids.raw[lids.rings[0]]
-    near = np.linalg.norm(lids.raw[moved][:, None] - ring[None], axis=2).argmin(axis=1)
-    out[moved] = share[near][:, None] * blink[moved]
     same_side = np.sign(lids.raw[:, 0]) == np.sign(lids.middle[0])
-    return out - np.where(same_side[:, None], lids.rest - lids.raw, 0.0)
+    return _AROUND * blink - np.where(same_side[:, None], lids.rest - lids.raw, 0.0)
 
 
 def between(lids: Lids, way: Floats) -> Floats:
