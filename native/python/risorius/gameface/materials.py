@@ -54,7 +54,8 @@ class Materials:
             mesh: name of the mesh in the DNA file.
             glb: the file that receives the material.
             known: material name -> number in `glb`; a known material is not added again.
-            longest: largest number of pixels of a picture's longer side.
+            longest: largest number of pixels of a picture's longer side; half of it for hair,
+                lashes and roughness.
         """
         base, kind = base_name(mesh), kind_of(mesh)
         name = safe(base)

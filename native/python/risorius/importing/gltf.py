@@ -518,11 +518,12 @@ def read(document: Document, take: str | None = None) -> Take:
 
     Args:
         document: from `open_glb` or `open_gltf`.
-        take: name or number of an animation; None: the first one that animates morph targets
-            or such properties.
+        take: name of an animation, or its number from 0; None: the first one that animates morph
+            targets or such properties.
 
     Raises:
-        AnimationFileError: no such animation, or missing parts of it.
+        AnimationFileError: no such animation, none that animates morph targets or such
+            properties, or missing parts of it.
     """
     notes: list[str] = []
     animations = document.json.get("animations")

@@ -26,7 +26,8 @@ class Keys:
     Attributes:
         times: float64[keys], seconds, ascending.
         values: float64[keys].
-        kinds: uint8[keys], interpolation after each key; empty: linear everywhere.
+        kinds: uint8[keys], interpolation after each key: CONSTANT, LINEAR or CUBIC; empty: linear
+            everywhere.
         leave: float64[keys], slope just after each key, per second; empty unless a key is CUBIC.
         arrive: float64[keys], slope just before each key, per second; empty as `leave`.
     """
@@ -73,10 +74,11 @@ def on_one_clock(
 ) -> tuple[Doubles, Doubles]:
     """Resamples all curves at the union of their keyframe times.
 
-    Linear curves are then exact. Smooth and stepped curves are also sampled `rate` times per
-    second.
+    Linear curves are then exact. If a curve is smooth or stepped, all curves are also sampled
+    `rate` times per second.
 
     Args:
+        curves: curves with keyframes; a curve without any becomes 0.
         rate: samples per second, or None for no samples between keyframes.
         budget: budget of the file.
 

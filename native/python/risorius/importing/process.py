@@ -33,10 +33,10 @@ def resample(clip: Clip, rate: float) -> Clip:
 
     Args:
         clip: any clip.
-        rate: frames per second of the result, above 0.
+        rate: frames per second of the result, above 0 and below 1e6.
 
     Raises:
-        ValueError: a rate that is not above 0.
+        ValueError: a rate out of range.
     """
     if not 0.0 < rate < 1e6:
         raise ArgumentError(f"a rate above 0 frames per second was expected, found {rate}")

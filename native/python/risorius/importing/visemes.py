@@ -383,7 +383,10 @@ class Lines:
 
 
 class Word(NamedTuple):
-    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame."""
+    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame.
+
+    `phonemes` has (first frame, mouth shape) of each phoneme.
+    """
 
     text: str
     start: int

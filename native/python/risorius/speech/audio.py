@@ -23,7 +23,7 @@ RATE = 16000
 
 _LOWEST_RATE, _HIGHEST_RATE = 4000, 768000
 _MOST_CHANNELS = 64
-_MOST_BYTES = 2**31  # limit of a file: three hours of stereo at 48 kHz and 32 bit
+_MOST_BYTES = 2**31  # limit of a file: 1.5 hours of stereo at 48 kHz and 32 bit
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
 _LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # values in the size fields of programs that write to a pipe
 

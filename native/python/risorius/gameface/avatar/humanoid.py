@@ -13,7 +13,7 @@ import numpy.typing as npt
 Doubles = npt.NDArray[np.float64]
 
 KINDS = ("minimal", "mixamo")
-_HEAD_HEIGHT = 1.5  # metres: the assumed height of a head whose joint is near the origin
+_HEAD_HEIGHT = 1.5  # metres: assumed height of a head's joint whose own height is not _STANDING
 _STANDING = (0.8, 2.4)  # metres: a head's joint between these heights is above a ground at 0
 _STRAIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Axes of Mixamo's bones, because poses of the web player TalkingHead assume them. Columns: the

@@ -34,7 +34,7 @@ class Spring:
 
     Attributes:
         name: name of the chain.
-        nodes: numbers of its nodes, from the root to the tip; the tip moves no vertex.
+        nodes: numbers of its nodes, from the root to the tip, which only ends the chain.
         colliders: indices of the colliders that the chain does not enter.
         hit: radius in metres of the sphere around each node that collides with the colliders.
         stiffness: how strongly the chain returns to its rest pose, 0 to 4.

@@ -26,8 +26,9 @@ Doubles = npt.NDArray[np.float64]
 
 SUFFIXES = (".glb", ".gltf", ".vrm")
 _TALLEST = 20.0  # units from feet to head: a taller body is in centimetres
-_HANGING = 25.0  # degrees below the horizontal of an arm that is no T-pose
-_OWN_FACE = 3  # targets with names of expressions that make a face
+_HANGING = 25.0  # degrees: an arm that hangs farther below the horizontal is not in a T-pose
+# smallest number of morph targets named after expressions that makes a mesh a face
+_OWN_FACE = 3
 
 # Names of expressions in older ARKit rigs and in VRoid.
 _OLDER = (
