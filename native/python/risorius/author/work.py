@@ -112,7 +112,7 @@ class Work:
     names: list[str]  # names of these inputs
     motions: Doubles  # [C, J, 3, 4] motions of the source's joints
     positions: Doubles  # [J, 3] neutral positions of the source's joints
-    head: int  # the joint that no expression moves with the largest weights on moved vertices
+    head: int  # of the joints that no expression moves: the one that carries most of the motion
     wanted: dict[int, Wanted] = field(default_factory=dict)  # by mesh, released early
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # indices of each level's new joints

@@ -74,8 +74,8 @@ class Imported:
     Attributes:
         clip: curves with the file's own names and times. Timecodes and dates are counted from the
             first frame, visemes from the start of the sound.
-        kind: one of KINDS; "curves" for curves that are not from a file, "rzc" for a clip file of
-            Risorius.
+        kind: one of KINDS; "curves" for curves that are not from a file, "rzc" or "clip" for a
+            clip file of Risorius.
         mapping: name of the built-in mapping for this kind of file, else of the mapping that knows
             the most curves; "" if none knows any.
         source: the file's name.

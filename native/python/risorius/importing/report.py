@@ -15,7 +15,8 @@ class Report:
 
     Attributes:
         source: name of the file, or of another source of the curves.
-        kind: kind of file, one of `importing.KINDS`, or "curves" without a file.
+        kind: kind of file: one of `importing.KINDS`, "rzc" or "clip" for a clip file of Risorius,
+            or "curves" without a file.
         mapping: name of the mapping used.
         mapped: curve of the source -> controls that it moves.
         unmapped: curves of the source that the mapping does not know.

@@ -70,14 +70,14 @@ def into_own_space(
 ) -> tuple[dict[str, Doubles], str]:
     """Convert a sculpt to the axes and the unit of a face.
 
-    A sculpt in the axes and the unit of the face is returned unchanged. Another one is rotated by
-    right angles and scaled by the ratio of two units. The second value is a sentence about the
-    conversion, "" for none.
+    A sculpt in the axes and the unit of the face is returned unchanged. Another one is rotated,
+    see turn_back(), and scaled. The second value is a sentence about the conversion, "" for none.
 
     Args:
         dna: the face.
         moved: float64[V, 3] by mesh name; the skin is required.
-        factor: the scale; None: guessed.
+        factor: the scale; None: 1 for a head up to twice as large or small as the face, else the
+            ratio of two units that fits best.
     """
     skin = skin_of(dna)
     before = np.asarray(dna.meshes[skin].positions, np.float64)
@@ -95,8 +95,10 @@ def into_own_space(
 
 
 def turn_back(turn: Doubles) -> Doubles:
-    """float64[3, 3]: the rotation from a head to a face, a multiple of right angles if possible.
+    """float64[3, 3]: the rotation from a head to a face.
 
+    A rotation by right angles is returned if the head is turned by less than 30 degrees from it,
+    otherwise the inverse of `turn`.
     Args:
         turn: float64[3, 3], the rotation from the face to the head.
     """

@@ -47,7 +47,7 @@ def complete(
     Args:
         found: the meshes of the head.
         template: a face of a DNA file.
-        laid: float64[V, 3], positions of the vertices of the template's skin on the head.
+        laid: float64[V, 3], positions of the vertices of the template's skin on the head, in cm.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
 

@@ -154,7 +154,9 @@ def fit(
         pose: the pose to begin with; it is not changed.
         steps: the steps of the fit in order.
         held: vertices of the model with known positions.
-        weights: float64[V], weight of each vertex of the model; None: the weights in the model.
+        weights: float64[V], weight of each vertex of the model; all skin vertices with a weight
+            other than 0 are paired, and `vertices` of the steps is ignored. None: the weights in
+            the model.
         form: the model, with the triangles of `head_form()`; None: `head_form()` itself.
     """
     form = form or head_form()

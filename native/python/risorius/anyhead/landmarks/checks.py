@@ -11,7 +11,7 @@ from ..form.fitting import Pose, Target
 from ..surface import Surface
 from .marks import LandmarkError
 
-LEAST, MOST = 200, 1_000_000  # vertices of a head
+LEAST, MOST = 200, 1_000_000  # smallest and largest number of vertices of a head
 _FLAT = 0.02  # of a mesh's size: border vertices within this distance of a plane lie in it
 _CUT = 0.3  # of the border: a mesh with more of its border in one end plane was cut there
 _DEEP = 0.12  # cm of the model: least depth of a step between the lids that counts as an opening
