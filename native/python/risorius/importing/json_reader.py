@@ -52,7 +52,7 @@ class Reader:
         """
         found = math.nan
         if isinstance(value, int | float | str) and not isinstance(value, bool):
-            try:  # some write numbers as text
+            try:  # some programs write numbers as text
                 found = float(value)
             except (ValueError, OverflowError):
                 found = math.nan

@@ -34,7 +34,7 @@ _WEAKEST = 0.01  # fraction of the strongest control's effect below which a cont
 _STILL = 1e-4  # a smaller change of all controls ends the iteration
 _GONE = 0.01  # price of a control that has already changed
 _HALVES = 5  # number of bisections between two poses
-_FEW = 2  # if more controls were selected, fewer are tried
+_FEW = 2  # superfluous controls are searched for only if more controls than this were selected
 _FREED = 4.0  # limits of a selected control during the fit, as a multiple of its selected change
 
 

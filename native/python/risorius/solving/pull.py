@@ -203,7 +203,9 @@ def least_squares(
     low, high = drag.unknowns.limits(drag.low - begin, drag.high - begin)
     for _ in range(max(1, rounds)):
         jacobian = drag.unknowns.columns(drag.jacobian(at))
-        if price < 0:  # constant, so that a later round does not give up the gain of an earlier one
+        # The price is computed in the first round only. With another price, a later round could
+        # give up the gain of an earlier one.
+        if price < 0:
             strongest = float((jacobian**2).sum(axis=0).max(initial=0))
             price = max(smallest**2 * strongest, 1e-20)
         here = drag.unknowns.values(at - begin)

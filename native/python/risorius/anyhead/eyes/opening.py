@@ -20,7 +20,7 @@ from ..surface import Surface
 from .eyeballs import Eyeball
 
 Mask = npt.NDArray[np.bool_]
-FAR = 1.9  # of the radius: largest distance of a lid from the eye's centre
+FAR = 1.9  # radii of the eye: largest distance of a lid from the eye's centre
 COLUMNS = 48  # directions across the opening at which the edges are known
 _WIDE, _HIGH = 72.0, 60.0  # degrees across and up from the front that are searched
 _STEP = 2.0  # degrees between the rays of the first search
@@ -28,7 +28,7 @@ _FINE = 0.5  # degrees between the rays of the second search, before the edges a
 _HALVINGS = 6
 _ABOVE = 1.001  # rays begin at this multiple of the distance of the eye's surface
 _LEAST = 6  # least number of rays of the first search in an opening, after repeated erosion
-_SURE = 12  # the same after the first erosion
+_SURE = 12  # least number of rays of the first search in an opening, after the first erosion
 _CUTS = 4  # largest number of erosions
 
 
@@ -237,8 +237,8 @@ def _refined(
     return Opening(frame, across, edges[0], edges[1])
 
 
-_MARGIN = np.radians(4.0)  # that rays of visible_gap go beyond the opening
-_HEIGHTS = 240  # rays per column
+_MARGIN = np.radians(4.0)  # angle by which the rays of visible_gap go beyond the lid edges at rest
+_HEIGHTS = 240  # rays of visible_gap per column
 
 
 def gap_rays(opening: Opening) -> Doubles:

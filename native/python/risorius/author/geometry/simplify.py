@@ -210,7 +210,8 @@ def _fewer(
     # A closed surface has twice as many triangles as vertices; an open surface has fewer.
     count, found = 2 * vertices, triangles
     for _ in range(_TRIES):
-        begin = found if len(triangles) > 4 * LARGE else triangles  # to save time
+        # To save time, each try on a large mesh simplifies the result of the try before it.
+        begin = found if len(triangles) > 4 * LARGE else triangles
         found, _ = _native.simplify(points, attributes, begin, count)
         now = len(np.unique(places[found]))
         if now <= vertices or not len(found):
