@@ -80,7 +80,7 @@ class Refiner:
 
         Args:
             poses: float64[n, targets], weights from 0 to 1.
-            most: largest number of combinations.
+            most: largest number of combinations; never more than MOST (120) are made.
         """
         wanted = list(self._candidates(poses))
         if not wanted or most < 1:

@@ -492,8 +492,8 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
     """int64[count] and float64[count, 2]: the flags of each keyframe, and two slopes.
 
     The slopes are the one after the keyframe and the one before the next keyframe. The file stores
-    flags and slopes once for each run of consecutive keyframes that share them. If the runs do not
-    sum to `count`, all keyframes are linear.
+    flags and slopes once for each run of consecutive keyframes that share them. If the runs are
+    damaged or do not sum to `count`, all keyframes are linear.
 
     Args:
         node: record of the AnimationCurve.

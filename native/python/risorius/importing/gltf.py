@@ -440,7 +440,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
         budget: limits memory and work; None: by the size of the file.
 
     Raises:
-        AnimationFileError: not a GLB of version 2, or a truncated file.
+        AnimationFileError: not a GLB of version 2, a truncated file, or no valid JSON in it.
     """
     budget = budget or Budget.of(len(data))
     name = str(path)

@@ -43,7 +43,8 @@ class Keys:
         return self.kinds.size == 0 or bool((self.kinds[:-1] == LINEAR).all())
 
     def sample(self, at: Doubles) -> Doubles:
-        """Values at times in seconds, constant before the first and after the last key."""
+        """Values at times in seconds, constant before the first and after the last key; 0 for a
+        curve without keys."""
         if self.times.size == 0:
             return np.zeros(at.size)
         straight = np.interp(at, self.times, self.values)

@@ -59,7 +59,8 @@ def read_performance(
             vertex count is one of these numbers. None: any mesh fits. Not used for an .npz file.
 
     Raises:
-        PerformanceError: an unknown kind of file, a damaged file, an unknown mesh.
+        PerformanceError: an unknown kind of file, a damaged file, an unknown mesh, or a coordinate
+            that is not finite or above 1e9.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".abc", ".npz"):

@@ -92,7 +92,7 @@ def make_drag(
         points: (mesh, vertex) of each of the P points.
         targets: float[P, 3], target positions in the file's unit.
         axes: float[P, k, 3], unit vectors along which distances count; None: all three axes.
-        weights: float[P], importance of each point; None: 1.
+        weights: float[P] of 0 or more, importance of each point; None: 1.
         limits: the controls that may change, and their ranges.
         sharing: how the drag is distributed over the controls.
 

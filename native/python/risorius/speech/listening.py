@@ -120,7 +120,8 @@ def follow(path: str | os.PathLike[str], found: Sequence[Phoneme]) -> Heard:
         found: phonemes in order; gaps become silence.
 
     Raises:
-        AudioError: an unusable file. ArgumentError: a phoneme begins after the end of the sound.
+        AudioError: an unusable file. ArgumentError: a phoneme other than silence begins after the
+            end of the sound.
     """
     samples = resample(*read_audio(path))
     duration = len(samples) / RATE

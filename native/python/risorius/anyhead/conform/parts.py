@@ -210,7 +210,8 @@ def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
     """The transform that keeps the distance between the eyeball and the lid rims in proportion.
 
     The rims are a narrow band of a sphere and determine its centre well. Its radius needs the
-    transform of the surrounding skin as a prior.
+    transform of the surrounding skin as a prior. That transform is returned if fewer than 12
+    vertices of the rims are visible.
     """
     start = change.around(middle, radius)
     away = change.before.points - middle

@@ -18,7 +18,9 @@ from .parts import finest, skin_of
 
 _AS_IT_IS = 2.0  # a head up to twice as large or small has the unit of the face
 _LEANS = np.cos(np.radians(30.0))  # cosine of the largest angle of a head to the axes of its file
-_FIVE = 5  # triangles of polygons with more corners are not compared
+# Triangulations of polygons with more corners are not recognised; polygons with more corners in the
+# other mesh are accepted without a comparison.
+_FIVE = 5
 
 
 def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
@@ -44,11 +46,12 @@ def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
 
 
 def has_polygons_of(mesh: Mesh, other: ObjMesh) -> bool:
-    """Whether a mesh has the vertex count and the polygons of a mesh of a face.
+    """Whether a mesh has the vertex count of a mesh of a face, and only polygons of that mesh.
 
     Args:
         mesh: the mesh of the face.
-        other: the other mesh; its polygons may be triangulated.
+        other: the other mesh; polygons of up to 5 corners may be triangulated in it. Its polygons
+            with more corners are accepted without a comparison.
     """
     if len(other.positions) != len(mesh.positions) or not other.faces:
         return False

@@ -125,7 +125,7 @@ class Eyelids:
 
     def apart(self, points: Doubles) -> float:
         """The mean distance between the upper and the lower edge, divided by the upper edge's
-        width.
+        width; 0 if an edge has no vertices.
 
         Args:
             points: float64[V, 3], vertex positions of the target in any pose or shape.
@@ -280,7 +280,8 @@ class Eyelids:
 
     def _apart(self, points: Doubles, turn: Doubles | None) -> Doubles:
         """float64[columns]: for each column of the opening, the angle in radians by which the edges
-        have to approach each other; negative if they overlap by more than closed lids may."""
+        have to approach each other; negative if they overlap by more than closed lids may; zeros if
+        an edge was found in no column."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         unit = self.mm / self.ball.radius
         apart = high - low

@@ -154,7 +154,8 @@ def _seen(tree: ClosestPoints, ball: Eyeball, rays: Doubles, turn: Doubles | Non
 
 def _between_lids(seen: Mask) -> Mask | None:
     """The largest region of free rays that does not reach the border of the searched grid; a region
-    at the border lies outside the lids. Erosion first cuts leaks through holes of a scan."""
+    at the border lies outside the lids. Erosion first cuts leaks through holes of a scan. None if
+    no region is large enough."""
     core = seen
     for cuts in range(_CUTS):
         core = core & _beside(core, np.minimum.reduce)
@@ -207,7 +208,8 @@ def _turned(frame: Frame, across: Doubles, up: Doubles, blob: Mask) -> Frame:
 def _refined(
     tree: ClosestPoints, ball: Eyeball, frame: Frame, columns: Doubles, bounds: Doubles
 ) -> Opening | None:
-    """The lid edges of each column, bisected to a hundredth of a degree.
+    """The lid edges of each column, bisected to a hundredth of a degree; None if the second search
+    finds no free ray.
 
     columns: angles across of the first search. bounds: float64[n, 2], lowest and highest free angle
     of each column. All in radians.

@@ -89,7 +89,8 @@ def _by_hand(name: str, one: Found, other: Found) -> bool:
 
 
 def _moved(one: Found, other: Found) -> Held | None:
-    """The landmarks that the user moved on either head, at their places on the second head."""
+    """The landmarks that the user moved on either head, at their places on the second head; None if
+    there are none that both heads and the model have."""
     places = head_form().places
     names = [n for n in common(one, other) if n in places and _by_hand(n, one, other)]
     if not names:

@@ -185,8 +185,10 @@ class Repairing:
         self.contacts = Contacts(target, faces, self.bodies)
 
     def repaired(self, pose: Pose, way: Doubles) -> Doubles:
-        """float64[V, 3]: the repaired displacements of a pose. Its faults are added to the report.
+        """float64[V, 3]: the repaired displacements of a pose.
 
+        If the pose has faults, or closes eyes or the mouth, its faults before and after the repair
+        are added to the report. A pose without displacements is returned unchanged.
         Args:
             pose: names of the raw controls with value 1.
             way: float64[V, 3], the displacements of the pose.

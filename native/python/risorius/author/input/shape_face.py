@@ -196,9 +196,10 @@ def make_shape_face(
     controls: Mapping[str, Sequence[str]],
     go_on: Callable[[], object] = lambda: None,
 ) -> Dna:
-    """Make a Dna with a mesh for each part and a blend shape for each control.
+    """Make a Dna with a mesh for each part and a blend shape for each control of an expression.
 
-    The joints are root and head, and eyes and jaw if `shapes` has joints for them.
+    The joints are root and head, and eyes and jaw if `shapes` has joints for them. Controls that
+    only turn these joints have no blend shape.
 
     Args:
         shapes: the mesh and its expressions.

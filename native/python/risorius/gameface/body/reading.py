@@ -181,11 +181,15 @@ def _scale_of(at: Mapping[str, Doubles]) -> float:
 
 
 def _facing(at: Mapping[str, Doubles], name: str) -> float:
-    """1 for a body that faces along +z, -1 for one that faces along -z, as VRM 0.x prescribes.
+    """1 for a body that faces along +z or has no pair of bones that shows it, -1 for one that faces
+    along -z, as VRM 0.x prescribes.
 
     Args:
         at: VRM name of a bone -> float64[3], its position in the file.
         name: name of the file for errors.
+
+    Raises:
+        GameFaceError: the head is not above the hips.
     """
     if "hips" in at and not at["head"][1] > at["hips"][1]:
         raise GameFaceError(
@@ -227,7 +231,7 @@ class _Nodes:
 
 
 def _rotation(matrix: Doubles) -> Doubles:
-    """The rotation part of a matrix that rotates and scales."""
+    """The rotation part of a matrix that rotates and scales; the identity for a singular matrix."""
     if not abs(np.linalg.det(matrix)) > 1e-30:
         return np.eye(3)
     left, _, right = np.linalg.svd(matrix)

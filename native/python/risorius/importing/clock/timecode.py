@@ -65,7 +65,8 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
     If every frame number is 0, the result is 30, because any rate gives the same times. Else a rate
     measured from the timecodes wins. It cannot be measured if the timecodes never reach the next
     second, or if too many rows are lost around each new second. Then the largest frame number
-    decides, provided that only one usual rate fits it.
+    decides: 30 to 59 means 60 frames per second, 29 in a take of 2 s or more means 30, and other
+    numbers give None.
     """
     frames = np.array([code.frames for code in codes])
     seconds = np.array([3600 * c.hours + 60 * c.minutes + c.seconds for c in codes])
