@@ -123,6 +123,7 @@ class Sums:
     def apart(self, of: tuple[str, ...], kind: str = PRODUCT) -> float:
         """The largest deviation of a linear sum of targets from the rig in mm, at the target
         weights at which the combination's weight is largest.
+
         Args:
             of: names of the targets.
             kind: formula of the weight, such as PRODUCT."""

@@ -199,9 +199,10 @@ def _agreeing(
 
 
 def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: float) -> Doubles:
-    """A pose with additional controls: by linear equations, it is at most `aim` mm from the
-    targets.
+    """A pose with additional controls: by linear equations, the full change brings the points to at
+    most `aim` mm from the targets, or as near as possible.
 
+    Of the full, half and quarter change the one that brings the points nearest is returned.
     Controls that have already changed have a price near 0.
 
     Args:

@@ -26,8 +26,9 @@ _FIVE = 5
 def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
     """float64[V, 3] by mesh name: vertex positions in the head, for each LOD 0 mesh with a match.
 
-    A mesh matches if it has the same polygons, also triangulated. If several meshes match, such as
-    both eyes, the most similar name is taken, then the first.
+    A mesh matches if has_polygons_of() is true. If several meshes match, such as both eyes, the
+    mesh whose name has the longest common beginning is taken, then the first. A mesh of the head is
+    taken only once.
 
     Args:
         dna: the face.
@@ -102,6 +103,7 @@ def turn_back(turn: Doubles) -> Doubles:
 
     A rotation by right angles is returned if the head is turned by less than 30 degrees from it,
     otherwise the inverse of `turn`.
+
     Args:
         turn: float64[3, 3], the rotation from the face to the head.
     """

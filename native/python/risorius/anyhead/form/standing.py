@@ -185,6 +185,7 @@ def _best(
 def coarsened(surface: Surface) -> Surface:
     """A simplified surface: all vertices in a cell of a grid are replaced by their mean. Triangles
     that become a line or a point are left out.
+
     Args:
         surface: the surface; it is not changed.
     """

@@ -265,6 +265,7 @@ def correct_again(
         progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
+        ArgumentError: the face has no mesh, or has networks or solvers.
         DnaError: a value is not finite, or progress returned False.
     """
     search = Search(rig, options, progress, psd_parts(source).values())

@@ -81,7 +81,8 @@ def _size(mesh: Mesh) -> float:
 
 
 def pieces_of(mesh: Mesh) -> Ints:
-    """int64[V]: number of the connected piece of each vertex; texture seams do not separate.
+    """int64[V]: number of the connected piece of each vertex; texture seams do not separate, and
+    vertices at the same position are connected.
 
     Args:
         mesh: the mesh.

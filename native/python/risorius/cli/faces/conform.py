@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, clock: Clock) -> int:
     """Run `risorius author --conform HEAD FACE.dna -o OUT.dna`: give FACE.dna the form of HEAD, and
-    write OUT.dna. Returns the exit code 0.
+    write OUT.dna and copies of the textures of FACE.dna. Returns the exit code 0.
 
     Args:
         args: arguments of `risorius author`.

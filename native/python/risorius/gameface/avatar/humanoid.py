@@ -153,7 +153,8 @@ def wanted(own: Iterable[str], kind: str) -> list[str]:
 
     Args:
         own: bones that the face has.
-        kind: one of KINDS: minimal adds the needed bones, mixamo all but the jaw; "": adds none.
+        kind: one of KINDS: minimal adds the needed bones, mixamo all but the jaw; "": adds none,
+            except a chest below an upper chest.
     """
     out = set(own)
     if kind == "mixamo":
