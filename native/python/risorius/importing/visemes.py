@@ -159,7 +159,7 @@ def read_rhubarb_tsv(text: str, name: str) -> Take:
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: an invalid line, times that do not ascend.
+        AnimationFileError: an invalid line, fewer than two lines, times that do not ascend.
     """
     starts: list[tuple[float, str]] = []
     for line, row in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
@@ -316,7 +316,8 @@ def read_dat(text: str, name: str, rate: float | None = None) -> Take:
         rate: frames per second; None: from an FPS line, else DAT_RATE with a note.
 
     Raises:
-        AnimationFileError: an invalid line, frames that do not ascend.
+        AnimationFileError: an invalid line, a rate that is not above 0, fewer than two shapes, or
+            frames that do not ascend.
     """
     lines = re.split(r"\r\n|\n|\r", text)
     notes: list[str] = []
@@ -383,7 +384,10 @@ class Lines:
 
 
 class Word(NamedTuple):
-    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame."""
+    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame.
+
+    `phonemes` has (first frame, mouth shape) of each phoneme.
+    """
 
     text: str
     start: int
@@ -446,7 +450,7 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: tables in another form.
+        AnimationFileError: tables in another form, no phonemes, or frames that do not ascend.
     """
     try:
         voices = [
