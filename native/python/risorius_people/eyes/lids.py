@@ -44,7 +44,7 @@ _NOT_CLOSED = [
     "eyeCheekRaise",
     "eyeUpperLidUp",
 ]
-WIDER = 0.75  # factor on the data's displacement, which starts with half-shut lids
+WIDER = 0.75  # factor on the data's eyeWiden displacement, which starts with half-shut lids
 # mm: offset of the ball to the front from the data's ball, and largest offset up or down
 _FORWARD, _ASIDE = 1.5, 1.2
 _RADIUS = 14.0  # mm: radius of the man's ball, for which the lengths above are given
@@ -150,7 +150,7 @@ class Lids:
 def place_ball(
     positions: Floats, groups: dict[str, Ints], rings: Ints, side: str
 ) -> tuple[Floats, float]:
-    """The middle and radius of the ball that fits the data's lids.
+    """The middle and radius, in decimetres, of the ball that fits the data's lids.
 
     Args:
         positions: float64[V, 3] of a person, in decimetres.
@@ -177,7 +177,7 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
         widen: float64[V, 3], the data's displacement that widens the eye.
 
     Returns:
-        The part of `widen` that was added, float64[V, 3].
+        The multiple of `widen` that was added, float64[V, 3]; negative if the lids were too open.
     """
     iris = IRIS * lids.radius
     edge = smoothed(lids.grid(lids.rest))[ROOT + 2] - lids.middle
@@ -232,8 +232,9 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     """Two displacements from the rest pose that close the lids, float64[V, 3] each.
 
-    The first lays both lids on one line. The second is the data's displacement, shortened because
-    it would move the upper lid past the lower lid.
+    The first lays both lids on one line. The second is the data's displacement, scaled in each
+    column of the grid by 0.2 to 1.2 so that the upper lid ends at the lower lid. Outside the grid
+    both are equal.
 
     Args:
         lids: the lids in their rest pose.
@@ -270,6 +271,8 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
 def _meeting(start: Floats, way: Floats, line: Floats) -> float:
     """The fraction of a displacement at which a point is as low as a line at the point's x.
 
+    The fraction may exceed 1. It is 0 for a displacement without height.
+
     Args:
         start: float64[3], the point.
         way: float64[3], the displacement.
@@ -304,14 +307,15 @@ def _even(share: Floats, known: Floats) -> Floats:
 
 
 def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
-    """float64[V, 3]: the shortened blink from the rest pose, for skin outside the grid.
+    """float64[V, 3]: the scaled blink from the rest pose, for skin outside the grid.
 
     The returned displacement also undoes the one that opened the lids to their rest pose.
 
     Args:
         lids: the lids in their rest pose.
         blink: float64[V, 3], the data's displacement.
-        share: float64[COLUMNS], the fraction of `blink` that is used.
+        share: float64[COLUMNS], factor on `blink` in each column of the grid; other skin gets the
+            factor of the nearest vertex of the outermost ring.
     """
     out = np.zeros_like(blink)
     moved = np.flatnonzero(np.abs(blink).max(axis=1) > 1e-7)

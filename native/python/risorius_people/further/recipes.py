@@ -58,7 +58,8 @@ def further_units(
 ) -> tuple[dict[str, Floats], dict[tuple[str, str], Floats]]:
     """The displacements of further.toml in decimetres.
 
-    Returns raw control -> float64[V, 3], and for correctives two raw controls -> float64[V, 3].
+    Returns raw control -> float64[V, 3], and for correctives two raw controls -> float64[V, 3]. The
+    displacement of a row with the key `with` is a corrective, and its control alone moves nothing.
 
     Args:
         source: the data with the shapes.

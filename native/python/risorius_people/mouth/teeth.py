@@ -71,7 +71,8 @@ _PROFILES = {
 # Rows of the gum on the side of the lip: mm from the gum's margin away from the biting edge.
 _GUM_HEIGHTS = (-0.15, 0.25, 1.0, 2.6, 5.2, 7.2)
 _GUM_OUT = (-0.9, 0.1, 0.4, 0.45, 0.0, -2.6)  # mm outside the crown's lip side
-_PALATE_HEIGHTS = (-0.2, 0.3, 1.6, 4.2)  # the same on the side of the tongue
+# Rows of the gum on the side of the tongue: mm from the gum's margin away from the biting edge.
+_PALATE_HEIGHTS = (-0.2, 0.3, 1.6, 4.2)
 _PALATE_IN = (0.9, -0.2, -1.6, -6.0)
 
 
