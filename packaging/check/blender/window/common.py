@@ -61,7 +61,7 @@ def take_up(hand: Hand) -> None:
 
 
 def put_down(hand: Hand) -> None:
-    """Click on the button of take_up() again, which returns to the previous tool."""
+    """Click on the button of the drag tool again, which returns to the previous tool."""
     scroll(hand, -40)
     hand.click(*hand.find(r"risorius\.drag_tool"))
     hand.wait("the tool is put down", lambda: not hand.ask("drags"))
