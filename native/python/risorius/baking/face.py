@@ -65,7 +65,8 @@ class Face:
     def rest(self, part: str) -> Floats:
         """The rest values of a part of the pose, one of PARTS.
 
-        The part "joints" has float32[joints, columns]; other parts have float32[n], one per name.
+        The part "joints" has float32[joints, columns], the difference from the neutral joint: 0,
+        but 1 for qw. Other parts have float32[n], one per name.
         """
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
@@ -144,6 +145,7 @@ def prepared(
 
     Raises:
         ValueError: no frame remains.
+        BudgetError: `rate` gives more frames than a clip of this size may have.
     """
     found = clip.frame_count
     if rate is not None:

@@ -157,7 +157,8 @@ class Pool:
         Closing the iterator early, even by an exception, stops the workers.
 
         Raises:
-            PoolError: no worker can be started.
+            PoolError: workers end again and again before they have begun.
+            OSError: the system cannot start a process.
         """
         queue, left = _Queue(jobs), len(jobs)
         try:
