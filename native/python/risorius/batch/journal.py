@@ -77,7 +77,7 @@ class Journal:
         Raises:
             KeyError: the journal has no such job.
             OSError: the journal cannot be read.
-            JobsError: the line of the job is no longer at its place in the file.
+            JobsError: the file has other bytes at the place of the job's line.
         """
         record = _parsed(self._line_of(name))
         if not isinstance(record, dict) or not isinstance(record.get("facts"), dict):

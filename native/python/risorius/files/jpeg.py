@@ -60,7 +60,7 @@ def jpeg(pixels: Pixels, quality: int = 85, *, fine_color: bool = False) -> byte
     image = pixels[::-1].astype(np.float64)
     planes = [image] if image.ndim == 2 else list(np.moveaxis(image @ _YCC.T, 2, 0))
     planes[0] = planes[0] - 128.0
-    side = 2 if len(planes) == 3 and not fine_color else 1  # per side of a unit
+    side = 2 if len(planes) == 3 and not fine_color else 1  # blocks of brightness along a unit
     tables = [_scaled(_LUMA, quality), _scaled(_CHROMA.ravel(), quality)]
     units = []
     for number, plane in enumerate(planes):

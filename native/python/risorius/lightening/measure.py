@@ -50,7 +50,7 @@ def errors(
     before: Dna, after: Dna, rigs: tuple[Rig, Rig], poses: Sequence[Pose], told: Told
 ) -> tuple[Doubles, Doubles]:
     """The largest and the root mean square distance between the vertices of two faces, each
-    float64[poses, LODs], in the file's unit.
+    float64[poses, LODs], in the file's unit; 0 for a LOD without vertices.
 
     Args:
         before: one face.
@@ -74,7 +74,8 @@ def errors(
 
 
 def microseconds(rig: Rig) -> float:
-    """Median duration in microseconds of one evaluation at LOD 0 with sixty active controls.
+    """Median duration in microseconds of one evaluation at LOD 0, with sixty active controls, or
+    with all controls if there are fewer.
 
     Args:
         rig: the rig to time.
