@@ -77,10 +77,11 @@ def mix_faces(
     """Makes the weighted mean of faces.
 
     Args:
-        parents: faces with equal names, topology and behavior; they are not changed.
+        parents: faces with equal names, topology and behavior, which check_compatible checks; they
+            are not changed.
         mix: the shares of the parents.
         name: name of the new face; None: from the parent with the largest share.
-        masks: masks of the first parent's regions; None: they are computed.
+        masks: masks of the first parent's regions; None: they are computed if they are needed.
 
     Returns:
         The mixed face. If one parent has all shares, the mix equals that parent bitwise, except
@@ -324,7 +325,7 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
         held += np.bincount(holds, weights=weight, minlength=count)
         for region, part in enumerate(masks.meshes[m].T):
             sums[:, region] += np.bincount(holds, weights=weight * part[vertex], minlength=count)
-    # A joint without vertices takes the mask of its children.
+    # A joint without vertices takes the mask of its children; without any, it is of the skull.
     for joint in reversed(sk.parent_order(dna)):
         parent = int(dna.joint_parents[joint])
         if parent != joint and held[parent] < 1e-6 and held[joint] > 0:
