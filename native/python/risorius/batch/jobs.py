@@ -166,9 +166,14 @@ def _all_of(value: Any, kind: type) -> bool:
 def read_jobs(source: Path) -> Plan:
     """Read a JOBS.toml and find the clips and characters that it names.
 
+    Args:
+        source: path of the JOBS.toml; paths in it are relative to its folder.
+
     Raises:
-        JobsError: the file cannot be read, a key or value is invalid, a pattern matches nothing, or
-            two jobs would write one file.
+        JobsError: the file cannot be read, a key or value is invalid, a pattern matches nothing,
+            there are more than MAX_JOBS jobs, or a job would write a file of another job, an input
+            or a file outside the output folder.
+        ReadingError: the file is too large, or a device.
     """
     try:
         values = toml.parse(toml.text_of(source))
