@@ -162,6 +162,9 @@ class Mixer:
         Args:
             source: a layer, or the source of a new layer.
             settings: fields of Layer.
+
+        Raises:
+            ValueError: an invalid layer, which is not added.
         """
         layer = source if isinstance(source, Layer) else Layer(source)
         self.layers = (*self.layers, replace(layer, **settings))
@@ -173,6 +176,9 @@ class Mixer:
         Args:
             place: index of the layer, from 0 at the bottom.
             settings: fields of Layer.
+
+        Raises:
+            ValueError: an invalid setting; the layer keeps its settings.
         """
         layers = list(self.layers)
         layers[place] = replace(layers[place], **settings)

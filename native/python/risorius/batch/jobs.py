@@ -103,7 +103,7 @@ class _Table:
         Args:
             key: name of the key.
             expected: the expected value in words, for the error.
-            check: whether a value is valid.
+            check: function that says whether a value is valid.
             default: value of a missing key; None makes a missing key an error.
 
         Raises:
@@ -266,6 +266,11 @@ def _mapping(table: _Table, base: Path) -> str | None:
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:
     """The files that match the patterns in `key`, sorted by path.
+
+    Args:
+        table: the table with the key.
+        key: key of one pattern or a list of patterns.
+        base: folder to which the patterns are relative.
 
     Raises:
         JobsError: a pattern has no match, or two patterns match the same file.

@@ -22,7 +22,13 @@ Told = Callable[[float], None]
 
 
 class Vertices:
-    """All vertices of a LOD, posed by the evaluator."""
+    """All vertices of a LOD, posed by the evaluator.
+
+    Attributes:
+        meshes: indices of the LOD's meshes.
+        counts: number of vertices of each of these meshes.
+        count: number of all these vertices.
+    """
 
     def __init__(self, dna: Dna, rig: Rig, lod: int) -> None:
         """Args:

@@ -104,12 +104,13 @@ class Lids:
         return np.asarray(values[self.rings])
 
     def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
-        """float64[13, COLUMNS, 3]: a grid whose rim touches the eye; skin around the rim follows.
+        """float64[13, COLUMNS, 3]: a grid with its rim at the distances _HEIGHTS from the eye. The
+        skin around the rim follows, and stays at least 0.9 mm (on the man) outside of the eye.
 
         Args:
             grid: float64[13, COLUMNS, 3], positions of the rings.
             turn: float64[3, 3], rotation of the eye from its rest pose; None: no rotation.
-            lift: mm that are added to the rim's distances from the eye's surface, _HEIGHTS.
+            lift: mm that are added to the distances _HEIGHTS, for the man's ball.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze

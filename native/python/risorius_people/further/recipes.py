@@ -129,7 +129,12 @@ def _ways(
 
 
 def _weight(places: Places, keys: Mapping[str, Any]) -> Floats:
-    """float64[V]: weights of a row's displacement."""
+    """float64[V]: weights of a row's displacement: the product of the areas that its keys name.
+
+    Args:
+        places: regions of the face.
+        keys: keys of the row in further.toml.
+    """
     out = np.ones(len(places.positions))
     if "lip" in keys:
         out *= places.lips[keys["lip"]]

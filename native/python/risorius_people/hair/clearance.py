@@ -63,6 +63,7 @@ def _depths(points: Floats, surface: Surface) -> Floats:
 
     Args:
         points: float64[..., 3], in decimetres.
+        surface: the head with the skin.
     """
     flat = points.reshape(-1, 3)
     places = surface.nearest(flat)

@@ -333,7 +333,8 @@ def parted_flow(surface: Surface) -> Floats:
     return tangent(flow, surface.normals)
 
 
-_KNOT = np.array([0.0, 0.46, -1.72])  # position of the bun on the man's head
+# Position of the bun, in decimetres on the man's head as in Surface.man.
+_KNOT = np.array([0.0, 0.46, -1.72])
 
 
 def bun(surface: Surface, person: Person) -> Strips:

@@ -48,9 +48,10 @@ LOWER = (
     Tooth("molar", 11.0, 10.2, 7.3),
     Tooth("molar", 10.4, 10.0, 6.9),
 )
-# At each height (0 at the edge, 1 at the gum, above 1 in the root): fraction of half the width,
-# fraction of half the thickness, and offset of the lip side in mm.
+# Heights of the rows of a crown: 0 at the edge, 1 at the gum, above 1 in the root.
 _HEIGHTS = (0.0, 0.05, 0.16, 0.38, 0.66, 0.88, 1.02, 1.25)
+# Kind of tooth -> at each of these heights: fraction of half the width, fraction of half the
+# thickness, and offset of the lip side in mm.
 _PROFILES = {
     "incisor": (
         (0.84, 0.93, 0.98, 1.0, 0.94, 0.86, 0.8, 0.72),

@@ -115,7 +115,7 @@ def open_section(hand: Hand, *panels: str) -> None:
 
 
 def need_section(hand: Hand, panel: str) -> None:
-    """Open a section of the tab if it is closed. Args: panel  class name of the section."""
+    """Open the section of the tab with the class name `panel` if it is closed."""
     scroll(hand, -40)
     hand.ask("watch", panel=panel)
     hand.ask("draw_again", panel=panel)
@@ -143,7 +143,7 @@ def _opened(hand: Hand, panel: str) -> bool:
 
 
 def scroll(hand: Hand, notches: int = 25) -> None:
-    """Turn the wheel over the sidebar. Args: notches  steps down; negative values go up."""
+    """Turn the wheel over the sidebar by `notches` steps down; negative values go up."""
     left, top, width, height = hand.ask("layout")["sidebar"]
     hand.move(left + width - 40, top + height / 2)
     hand.wheel(notches)
