@@ -202,7 +202,8 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of curves of `clip` that have no effect, because `face` has no such raw control."""
+    """The names of curves of `clip` that have no effect on `face`: they are neither raw controls of
+    it nor angles of a bone that it rotates by raw controls."""
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))

@@ -66,7 +66,14 @@ class Job:
 
 @dataclass(frozen=True)
 class Plan:
-    """The content of a JOBS.toml, expanded to jobs."""
+    """The content of a JOBS.toml, expanded to jobs.
+
+    Attributes:
+        source: path of the JOBS.toml.
+        output: folder of the outputs and of the journal.
+        summary: paths of the summary's files, .csv or .json.
+        jobs: the jobs.
+    """
 
     source: Path
     output: Path

@@ -87,7 +87,8 @@ class Vocabulary:
         title: its name for display.
         description: a text for display.
         meanings: name in its usual spelling -> Meaning.
-        is_loose: True: letter case, "_" and the difference of Left and L at the end are ignored.
+        is_loose: True: letter case, separators such as "_" and the difference of Left and L at the
+            end are ignored.
     """
 
     def __init__(self, name: str, table: Mapping[str, Any]) -> None:

@@ -398,7 +398,8 @@ def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
 
 
 def _maps(out: Dna, parents: Sequence[Dna], shares: Doubles) -> None:
-    """Sets the mean slopes and cuts of the conditional table of animated maps."""
+    """Sets the slopes and cuts of the conditional table of animated maps to the parents' means by
+    their shares in the whole face, float64[P]."""
     maps = copy.copy(parents[0].animated_maps)
     conditionals = copy.copy(maps.conditionals)
     own = [p.animated_maps.conditionals for p in parents]
