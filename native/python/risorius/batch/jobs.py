@@ -39,7 +39,16 @@ class JobsError(RisoriusError):
 
 @dataclass(frozen=True)
 class Options:
-    """Options that change the content of the outputs."""
+    """Options that change the content of the outputs.
+
+    Attributes:
+        parts: parts of the pose to write, from PARTS.
+        rate: frames per second to resample to; None: as in the clip.
+        frames: first and end (exclusive) of the frames after resampling; None: to the clip's end.
+        quaternions: True: rotations of joints are quaternions; False: Euler angles.
+        compress: True: the .npz is compressed.
+        mapping: the mapping of curves to controls.
+    """
 
     parts: tuple[str, ...] = DEFAULT_PARTS
     rate: float | None = None
