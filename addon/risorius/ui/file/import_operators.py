@@ -38,7 +38,8 @@ def import_character(
     options: build.BuildOptions,
     show: bool = False,
 ) -> Result:
-    """Build a character from a DNA file, and report warnings or the error.
+    """Build a character from a DNA file beside the scene's other faces, and report the result with
+    at most five warnings, or the error.
 
     Args:
         operator: operator that reports.

@@ -131,7 +131,8 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
 
 
 def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int, int] | None:
-    """The face under the cursor: armature, index of the mesh in the DNA file, index of the vertex.
+    """The face under the cursor: armature, index of the mesh in the DNA file, index of the vertex
+    nearest to the cursor.
 
     Args:
         context: context of Blender.

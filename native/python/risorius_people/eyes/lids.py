@@ -47,7 +47,7 @@ _NOT_CLOSED = [
     "eyeCheekRaise",
     "eyeUpperLidUp",
 ]
-WIDER = 0.75  # factor on the data's displacement, which starts with half-shut lids
+WIDER = 0.75  # factor on the data's eyeWiden displacement, which starts with half-shut lids
 # mm: offset of the ball to the front from the data's ball, and largest offset up or down
 _FORWARD, _ASIDE = 1.5, 1.2
 _RADIUS = 14.0  # mm: radius of the man's ball, for which the lengths above are given
@@ -107,12 +107,13 @@ class Lids:
         return np.asarray(values[self.rings])
 
     def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
-        """float64[13, COLUMNS, 3]: a grid whose rim touches the eye; skin around the rim follows.
+        """float64[13, COLUMNS, 3]: a grid with its rim at the distances _HEIGHTS from the eye. The
+        skin around the rim follows, and stays at least 0.9 mm (on the man) outside of the eye.
 
         Args:
             grid: float64[13, COLUMNS, 3], positions of the rings.
             turn: float64[3, 3], rotation of the eye from its rest pose; None: no rotation.
-            lift: mm that are added to the rim's distances from the eye's surface, _HEIGHTS.
+            lift: mm that are added to the distances _HEIGHTS, for the man's ball.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
@@ -153,7 +154,7 @@ class Lids:
 def place_ball(
     positions: Floats, groups: dict[str, Ints], rings: Ints, side: str
 ) -> tuple[Floats, float]:
-    """The middle and radius of the ball that fits the data's lids.
+    """The middle and radius, in decimetres, of the ball that fits the data's lids.
 
     Args:
         positions: float64[V, 3] of a person, in decimetres.
@@ -180,7 +181,7 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
         widen: float64[V, 3], the data's displacement that widens the eye.
 
     Returns:
-        The part of `widen` that was added, float64[V, 3].
+        The multiple of `widen` that was added, float64[V, 3]; negative if the lids were too open.
     """
     iris = IRIS * lids.radius
     edge = smoothed(lids.grid(lids.rest))[ROOT + 2] - lids.middle
@@ -235,8 +236,9 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     """Two displacements from the rest pose that close the lids, float64[V, 3] each.
 
-    The first lays both lids on one line. The second is the data's displacement, shortened because
-    it would move the upper lid past the lower lid.
+    The first lays both lids on one line. The second is the data's displacement, scaled in each
+    column of the grid by 0.2 to 1.2 so that the upper lid ends at the lower lid. Outside the grid
+    both are equal.
 
     Args:
         lids: the lids in their rest pose.
@@ -275,6 +277,8 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
 
 def _meeting(start: Floats, way: Floats, line: Floats) -> float:
     """The fraction of a displacement at which a point is as low as a line at the point's x.
+
+    The fraction may exceed 1. It is 0 for a displacement without height.
 
     Args:
         start: float64[3], the point.
