@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A flat sheet over a ball; formulas give the depth of each vertex in the ball.
+// Finds and repairs faults of a flat sheet of skin above a ball; formulas give the depth of each
+// vertex in the ball.
 #include "author/correct.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +19,7 @@ constexpr double kRadius = 6.0;       // mm, of a ball whose top lies 1 mm below
 double x_of(std::uint32_t v) { return double(v % kSheet) - 20.0; }
 double y_of(std::uint32_t v) { return double(v / kSheet) - 20.0; }
 
-/// A sphere of rings of vertices, with triangles that face outwards.
+/// Appends the vertices of a ball, ring after ring, to `positions`; its triangles face outwards.
 Skin::Solid sphere(std::vector<Vector3>& positions) {
   constexpr std::uint32_t kRings = 60, kAround = 60;
   Skin::Solid out;
@@ -186,6 +187,7 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
 /// Repairs a pose of the sheet of skin. The pose has a single part (such as an expression), and the
 /// skin without this part has the same positions. So taking the part back removes no fault, and
 /// only the least squares solve can help. Faults that the sheet has before the pose are allowed.
+/// Expects that only vertices near the middle move and that the reported faults are those measured.
 Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, scene.pose(scene.skin.neutral));

@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::uint32_t kSide = 21;  // vertices along a side: 441 in all
 
-/// A flat sheet of 2 x 2 units around the origin, in the plane z = 0.
+/// A flat sheet of 2 x 2 units around the origin, in the plane z = 0, whose expressions move
+/// nothing.
 Shapes sheet(std::size_t expressions) {
   Shapes out;
   out.expressions = expressions;
@@ -40,7 +41,8 @@ double bump(const Vector3& p, double x, double y) {
   return d < 1.0 ? (1.0 - d) * (1.0 - d) : 0.0;
 }
 
-/// Three expressions: the left side rises, the right side rises, the left side rotates about y.
+/// Three expressions: the left side (x > 0) rises, the right side rises, the left side rotates
+/// about y.
 Shapes two_sides() {
   Shapes out = sheet(3);
   const double angle = 0.3;
@@ -55,7 +57,7 @@ Shapes two_sides() {
   return out;
 }
 
-/// The position of a vertex that the fit's joints give, by Rodrigues' formula.
+/// The position of vertex v in expression e that the fit's joints give, by Rodrigues' formula.
 Vector3 posed(const Shapes& shapes, const Fit& fit, std::size_t v, std::size_t e) {
   Vector3 out{};
   const Vector3& p = shapes.neutral[v];

@@ -75,7 +75,7 @@ TEST(ClipCurves, RandomBitsDoNotGrow) {
   }
 }
 
-// A smooth curve takes less than a third of its size: predicting a polynomial of degree 4 leaves
+// A smooth curve takes at most a third of its size: predicting a polynomial of degree 4 leaves
 // only rounding errors.
 TEST(ClipCurves, SmoothOnesAreContinued) {
   const Clip clip = make_all_kinds(512);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Heap memory of a clip's reader and writer.
+// Limits of the heap memory that encoding, decoding and an open reader of a clip take.
 #include <gtest/gtest.h>
 
 #include "clip/file/encoder.h"

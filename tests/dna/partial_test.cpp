@@ -105,8 +105,8 @@ std::size_t target_bytes(const BlendShapeTarget& t) {
   return 4 * list(t.vertex_indices.size(), 4) + 2;
 }
 
-// The regions of the bodies of elements. In the file a body is preceded by its size or, in 2.1, by
-// the offset of its end.
+// The regions of the bodies of n elements, of which the first begins at offset `at`. In the file a
+// body is preceded by its size or, in 2.1, by the offset of its end.
 std::vector<Region> sized_elements(const File& file, std::size_t at, std::size_t n) {
   std::vector<Region> out;
   for (std::size_t i = 0; i < n; ++i) {
@@ -319,7 +319,7 @@ TEST(PartialLoad, ReadsNothingOfADroppedMesh) {
 }
 
 // The fifth mesh belongs to all LODs and is kept. Of its dropped targets only four small reads each
-// are allowed, which find the end of the target.
+// are allowed, which find the end of the target, and one window that is read ahead.
 TEST(PartialLoad, PassesOverDroppedTargetsOfAKeptMesh) {
   const Mesh mesh = make_head().geometry.meshes[4];
   for (const std::uint16_t minor : {std::uint16_t{8}, std::uint16_t{1}}) {

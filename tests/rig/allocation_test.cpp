@@ -77,7 +77,8 @@ Rig full_rig(const Kind& kind) {
 
 constexpr std::size_t kFilm = 2 * simd::kFrames + 3;  // whole blocks and a partial one
 
-// Frames [kFilm, 5]: neutral, usual values, out of range, NaN, infinite, and usual values again.
+// Raw controls, float32[kFilm, 5]. Six frames repeat: neutral, usual values, out of range, NaN,
+// infinite, and usual values again.
 std::vector<float> film() {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   const float frames[][5] = {{0, 0, 0, 0, 1},
