@@ -180,7 +180,7 @@ TEST(Fit, BothSidesOfASymmetricMeshAreAlike) {
   }
 }
 
-/// The largest displacement of any vertex by one joint in an expression.
+/// The largest displacement of any vertex in expression e if only joint j moves.
 double effect(const Shapes& shapes, const Fit& fit, std::size_t j, std::size_t e) {
   Fit alone = fit;
   for (std::size_t other = 0; other < fit.joints.size(); ++other) {
@@ -252,8 +252,8 @@ TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
     options.bound = true;
     auto best = fit_joints(shapes, options);
     ASSERT_TRUE(last && best);
-    // The bound is not exact: the fit minimises over four expressions, because it adds the mirror
-    // of the third one.
+    // The best round may have a slightly larger error here than the last one: the fit compares
+    // rounds over four expressions, because it adds the mirror of the third one.
     EXPECT_LE(largest_error(shapes, *best), 1.1 * largest_error(shapes, *last)) << rounds;
     any = any || largest_error(shapes, *best) < 0.9 * largest_error(shapes, *last);
   }
@@ -364,8 +364,8 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
   auto again = fit_weights(shapes, joints, few(9), start);
   ASSERT_TRUE(again) << again.error().describe();
   EXPECT_LT(largest_error(shapes, *again), 1.1 * largest_error(shapes, *fit));
-  // 30 joints without motion, more than the candidates of a vertex, must not displace a moving
-  // joint.
+  // 30 joints without motion, more than the number of candidate joints of a vertex, must not take
+  // the place of a moving joint among the candidates.
   std::vector<GivenJoint> many(30);
   many.insert(many.end(), joints.begin() + 1, joints.end());
   StartWeights later = start;
@@ -387,7 +387,8 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
             core::ErrorCode::kInvalidLength);
 }
 
-/// The sheet half as wide, twice as deep and sheared, with displacements scaled alike.
+/// The sheet `shapes`, half as wide, twice as deep and sheared; its displacements are scaled in the
+/// same way but not sheared.
 Shapes reshaped(Shapes shapes) {
   for (Vector3& p : shapes.neutral) p = {0.5 * p[0], p[1], 2.0 * p[2] + 0.1 * p[1]};
   for (std::size_t i = 0; i < shapes.displacements.size(); i += 3) {

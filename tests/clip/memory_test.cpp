@@ -20,8 +20,9 @@ std::size_t size_of(const Clip& clip) {
   return size;
 }
 
-// Limits of heap memory: kTimesTheClip times the clip's size or kTimesTheFile times the file's size
-// (native/README.md documents both), plus kBeside bytes for the frames of a writer's block.
+// Limits of heap memory: kTimesTheClip times the clip's size for encoding and decoding, and
+// kTimesTheFile times the file's size for an open reader (native/README.md documents both), plus
+// kBeside bytes for the frames of a writer's block.
 constexpr std::size_t kTimesTheClip = 4, kTimesTheFile = 16, kBeside = 64 * 1024;
 
 TEST(ClipMemory, OfWritingGrowsWithTheClip) {

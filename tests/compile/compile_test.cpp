@@ -329,8 +329,8 @@ TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {
   EXPECT_NEAR(evaluate_once(rig.value(), {1.0f}, 1).joints[3], 0.5f, 1e-6f);
 }
 
-// Each of 60,000 correctives reads the next one. The time must not grow with the square of their
-// number.
+// Each of 60,000 correctives reads the next one, and the last one reads the raw control. The time
+// must not grow with the square of their number.
 TEST(Compile, LongChainOfCorrectivesCompilesInTime) {
   constexpr std::uint16_t n = 60000;
   dna::Dna dna = make_face(1, n, 1, 1);

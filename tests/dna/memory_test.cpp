@@ -160,14 +160,14 @@ TEST(Memory, ManyEmptyElementsTakeAFewTimesTheirBytes) {
   }
 }
 
-// Sizes just above a power of two: a list that doubles its capacity then has its old and its new
-// buffer at the same time.
+// Numbers of elements just above a power of two: a list that doubles its capacity then has its old
+// and its new buffer at the same time.
 constexpr std::size_t kSizes[] = {4097, 8193};
 // Heap memory in bytes in addition to the factors: windows of readers, messages, and the stack of
 // open containers.
 constexpr std::size_t kBesideOthers = 64 * 1024;
-// Limits of heap memory, as factors of the size of the face (kTimesFromJson: of the JSON text);
-// native/README.md documents them.
+// Limits of the heap memory of to_json(), from_json() and filter_lods(), as factors of the size of
+// the face (kTimesFromJson: of the JSON text); native/README.md documents them.
 constexpr std::size_t kTimesToJson = 48, kTimesFromJson = 64, kTimesFiltered = 24;
 
 std::size_t size_of(const Dna& dna) { return static_cast<std::size_t>(size_in_bytes(dna)); }

@@ -292,8 +292,8 @@ bool keeps(const Selection& s, std::size_t lod) {
   return std::ranges::find(s.kept, lod) != s.kept.end();
 }
 
-// Expects that a kept element is read completely and a dropped one is not.
-// In: slack  bytes of the element that may be read together with the number of elements
+// Expects that a kept element is read completely, and at most `slack` bytes of a dropped one.
+// In: slack  for the first element, which may be read together with the number of elements
 void expect_whole_or_untouched(const RecordingSource& source, const Region& element, bool kept,
                                std::size_t slack) {
   if (kept) {
@@ -432,7 +432,8 @@ TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
   EXPECT_EQ(cut.skin_joint_indices, (Array<std::uint16_t>{0, 1, 0, 1, 0}));
 }
 
-// The first channel of full_face.h gets one control after the other: the last raw one, the
+// The first entry of the blend shape channels of make_full_face() gets one control after the other
+// as its input: the last raw one, the
 // corrective, both controls of networks, and the RBF pose. The channel is dropped if the layer that
 // computes its control is not loaded.
 TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
@@ -460,7 +461,8 @@ TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
 }
 
 // In a file without layer rbfe, as before 2.5, the number of pose controls is the number of poses
-// in rbfb, which must be read. An error in it names its place.
+// in rbfb, which must be read. An error in rbfb names its field and
+// its offset.
 TEST(PartialLoad, SaysWherePosesCannotBeCounted) {
   Dna face = make_full_face();
   face.rbf_behavior_ext = {};

@@ -23,7 +23,7 @@ TEST(Allocation, CounterSeesAnAllocation) {
 }
 
 // Whether a function is noexcept. Evaluation must never throw, because the caller's thread may not
-// be able to handle it.
+// be able to handle an exception.
 template <class F, class... Args>
 constexpr bool never_throws = std::is_nothrow_invocable_v<F, Args...>;
 using Evaluate = void (*)(const Rig&, const float*, std::uint32_t, bool, Workspace&,

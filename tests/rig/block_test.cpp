@@ -297,7 +297,7 @@ TEST(Block, GroupsNameTheBlocksThatTheyWrite) {
   }
 }
 
-// Evaluation looks extra pieces up by block, so that they must be sorted.
+// Evaluation looks up the extra pieces of a block, so that extra pieces must be sorted by block.
 TEST(Block, ExtraPiecesOutOfOrderAreRefused) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups = std::vector{make_group({4, 4}, {0}, {2, 0, 22, 20}, {1, 2, 3, 4})};

@@ -117,7 +117,8 @@ TEST_F(RigFile, PrefixesAndMoreBytesAreRefused) {
 }
 
 // The fields of the header begin at these bytes: magic 0, version 7, byte order 8, header size 12,
-// size 16, hash 24, numbers 32.
+// size 16, hash 24, the numbers of
+// RigHeader 32.
 TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
   const auto flipped = [&](std::size_t at) { return static_cast<std::uint8_t>(bytes_[at] ^ 1); };
   for (const Trust trust : kTrusts) {

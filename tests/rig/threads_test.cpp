@@ -35,7 +35,8 @@ Rig full_rig(const CompileOptions& options) {
   return std::move(rig).value();
 }
 
-// Frame n of an animation in which a jaw moves and a quaternion rotates.
+// The raw controls of make_full_face in frame n of an animation: a jaw moves, and a quaternion
+// rotates.
 std::vector<float> frame(std::size_t n) {
   const float jaw = static_cast<float>(n % 5) / 4.0f;
   const float side = static_cast<float>(n % 3) * 0.48f;  // 0, 0.48, 0.96

@@ -17,7 +17,8 @@ using namespace testing_support;
 
 constexpr std::size_t kRaw = 24, kJoints = 40;
 
-// Joint groups of 1 to 90 rows, with fewer rows at each coarser LOD. Some groups write the same
+// Joint groups of 1 to 90 rows, with about half of the rows of the next finer LOD, or none, at LODs
+// 1 and 2. Some groups write the same
 // attributes, and some attributes between them have no row.
 dna::Dna many_groups() {
   std::mt19937 random(11);

@@ -479,8 +479,8 @@ TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
   }
 }
 
-// Skins ten vertices with eight influences each, in three groups. The three floats after the
-// vertices must not be written.
+// Skins ten vertices with eight influences each, in three groups of kSkinGroup vertices. The three
+// floats after the vertices must not be written.
 std::vector<float> skinned(const Kernels& kernels) {
   std::mt19937 random(8);
   const Matrix<float> matrices = random_matrix(12, 5, random),

@@ -62,7 +62,7 @@ TEST(LeastChange, MeetsTheConditionsOfTheLeast) {
   for (int i = 0; i < 60; ++i) {
     const std::size_t rows = 1 + static_cast<std::size_t>(i) % 9, columns = 40;
     const Doubles a = random(numbers, rows * columns, -1, 1);
-    // In every second case many targets are too large to be reached.
+    // In every second case many values of b are too large to be reached within the bounds.
     const Doubles b = random(numbers, rows, -1, 1.0 + 20.0 * (i % 2));
     const Doubles low = random(numbers, columns, -0.4, 0), high = random(numbers, columns, 0, 0.4);
     const double ridge = i % 3 == 0 ? 1.0 : 1e-6;
