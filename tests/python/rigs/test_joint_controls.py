@@ -139,7 +139,7 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
 
 
 def neck_face(folder):
-    """A face whose last joint is neck_02, which gets half of the neck rotation of a clip."""
+    """(Dna, loaded face): the last joint is neck_02, which gets half of a clip's neck rotation."""
     dna = face()
     dna.joint_names = ["spine", "neck_01", "neck_02"]
     dna.raw_control_names = ["jaw", *(f"neck_02.q{part}" for part in PARTS)]

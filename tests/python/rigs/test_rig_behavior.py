@@ -463,7 +463,11 @@ def test_rotation_is_one_of_two():
 
 
 def one_pose_solver(threshold):
-    """A rig with a solver of one pose at 0: it writes 1 - x to a control that moves a joint."""
+    """A rig with a solver of one pose at 0: it writes 1 - x to a control that moves a joint.
+
+    Args:
+        threshold: weight threshold of the solver.
+    """
     dna = risorius.Dna()
     dna.lod_count, dna.rotation_unit = 1, "radians"
     dna.raw_control_names, dna.joint_names, dna.joint_parents = ["x"], ["joint"], [0]
