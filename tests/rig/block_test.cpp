@@ -297,7 +297,8 @@ TEST(Block, GroupsNameTheBlocksThatTheyWrite) {
   }
 }
 
-// Evaluation looks up the extra pieces of a block, so that extra pieces must be sorted by block.
+// Evaluation finds the extra pieces of a block of 16 joint attributes by a binary search, so extra
+// pieces must be sorted by Piece::block.
 TEST(Block, ExtraPiecesOutOfOrderAreRefused) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups = std::vector{make_group({4, 4}, {0}, {2, 0, 22, 20}, {1, 2, 3, 4})};
@@ -324,8 +325,8 @@ TEST(Block, ChannelsOfARunFollowEachOther) {
   }
 }
 
-// No array of the block limits mask_count, the number of regions. A small block must not demand a
-// large workspace.
+// No array of the rig's bytes limits mask_count, the number of masks of the networks' regions. A
+// few bytes must not demand a large workspace.
 TEST(Block, ScratchIsHeldAgainstTheBlock) {
   const Rig rig = must_compile(face_with_everything());
   constexpr std::size_t kRigHeader = 32;  // bytes before the RigHeader
@@ -346,8 +347,8 @@ TEST(Block, ANetworkWritesNoMoreThanItsOwnValues) {
   for (std::size_t i = 0; i < rig.ml_operations.size(); ++i) {
     MlOperation& operation = operations[i];
     if (operation.kind == MlOperation::kMlp && networks++ == 0) operation.value_count -= 1;
-    // Another operation gets the removed value, so that the total still equals the number in the
-    // header.
+    // Another operation gets the value that the network lost, so that the sum of all value_count
+    // still equals the number in the header.
     if (operation.kind == MlOperation::kScatter && scatters++ == 0) {
       operation.values_begin = 0, operation.value_count = 1;
     }
