@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests idle movement: equal for equal seeds, in range, with measured speeds and frequencies."""
+"""Tests idle movement: equal for equal seeds, in range, as fast and as frequent as people's."""
 
 from __future__ import annotations
 

@@ -378,7 +378,7 @@ def test_batch_rows_are_single_evaluations(name, simd, rotation):
 
 
 def random_raw(rng, dna):
-    """Random controls, in 30 % of calls zeros; quaternions of setups and solvers are unit ones."""
+    """Random controls, in 30 % of calls zeros; controls of a quaternion always have unit length."""
     raw = rng.uniform(0, 1, len(dna.raw_control_names)) * (rng.random() < 0.7)
     names = list(dna.raw_control_names)
     for i, name in enumerate(names):
