@@ -15,7 +15,7 @@ namespace risorius::bench {
 struct Frames {
   std::size_t count = 0, controls = 0;
   std::vector<float> values;  // [count, controls]
-  std::string name;           // as in the table
+  std::string name;           // in the table of rig_bench
   const float* at(std::size_t frame) const { return values.data() + frame * controls; }
 };
 

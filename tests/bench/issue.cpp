@@ -113,9 +113,9 @@ __attribute__((target("avx2,fma"))) float issue_256(const Data& d, std::size_t i
   return sum;
 }
 
-// Issues the kernel's reads and multiply-adds in registers of four floats, as in SSE4, where
-// multiplication and addition are separate instructions. Returns a sum, so that the compiler keeps
-// the work.
+// Issues the skinning kernel's reads and multiply-adds in registers of four floats, as in SSE4,
+// where multiplication and addition are separate instructions. Returns a sum, so that the compiler
+// keeps the work.
 float issue_128(const Data& d, std::size_t influences) {
   constexpr std::size_t kSums = 4;
   __m128 s[kSums][3];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The content of dense groups and its order.
+// The joint groups that regroup makes, one for each region, and the order of their rows.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which small coefficients are removed, and which are kept.
+// Which small coefficients of joint groups regroup removes, and which it keeps.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which joints share a region.
+// Which joints regroup puts into one region.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

@@ -10,7 +10,8 @@
 namespace risorius::simd {
 namespace {
 
-// Sets RISORIUS_SIMD while the object exists, and restores it afterwards.
+// Sets RISORIUS_SIMD while the object exists. Its destructor restores the value; a variable that
+// was not set becomes empty, which find_kernels treats alike.
 class Environment {
  public:
   explicit Environment(const char* value) {
