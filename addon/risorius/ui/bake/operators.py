@@ -180,8 +180,8 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
     bl_idname = "risorius.unbake"
     bl_label = "Back to Live"
     bl_description = (
-        "Let the controls move the selected faces again. Baked actions are removed, "
-        "except actions that you protected or use elsewhere"
+        "Let the controls move the selected faces again. Baked actions are removed, except "
+        "actions that you edited, gave a fake user, or use elsewhere"
     )
 
     @classmethod

@@ -58,7 +58,7 @@ class RISORIUS_OT_next_key(FaceOperator, Operator):
     )
     region: bpy.props.StringProperty(
         name="Region",
-        description="Region to change; empty: all regions",
+        description="Region whose next key is found; empty: the whole face",
         options={"SKIP_SAVE"},
     )
 

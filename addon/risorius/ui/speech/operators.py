@@ -42,7 +42,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     )
     transcript: bpy.props.StringProperty(
         name="Transcript",
-        description=("Spoken words in English; empty: recognise the words in the sound"),
+        description="Spoken words in English; empty: recognise the sounds without the words",
     )
     transcript_text: bpy.props.StringProperty(
         name="Text", description="A text of this file that holds the transcript"

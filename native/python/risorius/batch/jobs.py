@@ -388,7 +388,8 @@ def _refuse_collisions(plan: Plan) -> None:
     taken = {_folded(path): "the summary" for path in plan.summary}
     if len(taken) < len(plan.summary):
         raise JobsError(
-            f"{plan.source}: summary: different files were expected, found a file twice"
+            f"{plan.source}: summary: different files were expected in this list, found a "
+            "file twice"
         )
     taken[_folded(plan.source)] = "this file itself"
     taken[_folded(plan.journal)] = "the journal"

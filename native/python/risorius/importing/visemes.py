@@ -209,7 +209,12 @@ def _rhubarb_starts(starts: list[tuple[float, str]], name: str) -> Take:
 def _check_order(starts: Sequence[tuple[float, str]], name: str, line: int) -> None:
     if starts[-1][0] < 0.0 or (len(starts) > 1 and starts[-1][0] < starts[-2][0]):
         raise AnimationFileError(
-            name, f"times that ascend from 0 were expected, found {starts[-1][0]:g}", line=line
+            name,
+            (
+                f"times that ascend from 0 were expected, found {starts[-1][0]:g}: no "
+                "time below 0 s or before the previous time"
+            ),
+            line=line,
         )
 
 
@@ -299,7 +304,11 @@ def _rhubarb_cues(rows: Sequence[tuple[str, str, str]], name: str) -> Take:
         before = cues[-1].end if cues else 0.0
         if not before - 0.005 <= cue.start <= cue.end < np.inf:
             raise AnimationFileError(
-                name, f"{place}: times that ascend were expected, found {start} to {end}"
+                name,
+                (
+                    f"{place}: times that ascend from {before:g} s were expected, found "
+                    f"{start} to {end}"
+                ),
             )
         if cue.start > before + 0.005:
             cues.append(Cue(before, cue.start, "X"))
@@ -496,7 +505,13 @@ def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: st
         starts.append((word.end + 1, "rest"))
     times = [frame for frame, _ in starts]
     if any(b < a for a, b in pairwise(times)) or starts[0][0] < 0:
-        raise AnimationFileError(name, f"voice {voice!r}: frames that ascend were expected")
+        raise AnimationFileError(
+            name,
+            (
+                f"voice {voice!r}: frames of 0 or more, none before the previous frame, were "
+                "expected"
+            ),
+        )
     cues = _from_starts(
         [(frame / rate, shape) for frame, shape in starts], (times[-1] + 1) / rate, "rest"
     )
