@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Makes poses and workspaces (the scratch memory of evaluations) of the sizes that a Rig needs.
 #include "rig/pose.h"
 
 namespace risorius::rig {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Pose: the result of an evaluation. Workspace: its scratch memory.
+// Pose: the result of an evaluation. Workspace: its scratch memory, which also keeps lists of the
+// frame before. A control is active if it is not 0; its columns are its coefficients in the joint
+// groups.
 #pragma once
 
 #include <algorithm>
@@ -79,17 +81,17 @@ struct alignas(128) Workspace {
   bool warm = false;
   // Correctives.
   KeptControls firing_for;              // the active controls for which firing holds
-  std::vector<std::uint16_t> firing;    // watched correctives that may not be 0, as indices into
-  std::size_t firing_count = 0;         // psds; the first firing_count entries are valid
+  std::vector<std::uint16_t> firing;    // watched correctives that can differ from 0, as indices
+  std::size_t firing_count = 0;         // into psds; the first firing_count entries are valid
   bool fires_all = false;               // true: no factor of the listed correctives is 0
   std::vector<std::uint64_t> psd_bits;  // a bit for each corrective control that is not 0
   // [controls]: in a latent evaluation the controls before the correctives ran.
   std::vector<float> last_controls;
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
-  KeptControls listed_for;  // the active controls for which moves and blocks hold
-  // The traversal of the frame in which moves and blocks were computed; after kAdded, columns and
-  // ends are not valid.
+  KeptControls listed_for;  // the active controls for which moves and live_blocks hold
+  // The traversal of the frame in which moves, live_blocks and live were computed; after kAdded,
+  // columns and column_ends are not valid.
   Traversal listed = Traversal::kListed;
   std::size_t whole_frames = 0;  // evaluations that read all columns
   std::size_t added_frames = 0;  // evaluations that added columns in the order of memory

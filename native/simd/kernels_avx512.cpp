@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// The kernels for AVX-512: gives the loops of kernels_body.h, rotations_body.h and skin_body.h
+// their instructions on registers of 16 floats, one in each lane. A piece copies consecutive values
+// to those of 16 places whose bit is set in its mask.
 #include "simd/kernels.h"
 
 #if defined(__x86_64__) || defined(_M_X64)

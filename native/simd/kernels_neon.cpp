@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// The kernels for ARM NEON: gives the loops of kernels_body.h and skin_body.h their instructions on
+// registers of four floats.
 #include <bit>
 
 #include "simd/kernels.h"

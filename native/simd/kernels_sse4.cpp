@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// The kernels for SSE4.1: gives the loops of kernels_body.h, rotations_body.h and skin_body.h their
+// instructions on registers of four floats, one in each lane. The bits equal the results of the
+// scalar kernels.
 #include <bit>
 
 #include "simd/kernels.h"

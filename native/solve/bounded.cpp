@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Least squares with bounds on the unknowns: least_change() solves the dual problem, which has one
+// unknown for each row, and descend() minimises a quadratic function by coordinate descent with
+// Newton steps.
 #include "solve/bounded.h"
 
 #include <algorithm>

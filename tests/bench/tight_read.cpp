@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Reads the cache lines that an evaluation must read, the columns of the active controls (controls
+// that are not 0), as fast as the CPU can.
 #include "bench/tight_read.h"
 
 #include <algorithm>

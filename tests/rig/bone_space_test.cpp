@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Converts poses of joints to transforms of bones in other axes and units.
 #include "rig/outputs/bone_space.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// A face in a sequence of frames: a corrective or a network that reads a later stage gets its value
+// from the frame before.
 #include "rig/stages/instance.h"
 
 #include "rig/stages/evaluate.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Compiles the blend shape targets of a mesh of three vertices, and adds them with weights.
 #include "rig/outputs/morph.h"
 
 #include "support/face.h"

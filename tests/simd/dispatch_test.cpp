@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// The table of kernels, the inner loops for one instruction set, is chosen by its name, by the
+// environment variable RISORIUS_SIMD, or as the best table of the CPU.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Checks promises of the native code about any bytes. Each function with a text as result returns
+// the broken promise, or kKept (no text). Numbers are moderate if results must be finite; a forged
+// rig is opened from changed bytes.
 #include "support/promises.h"
 
 #include <algorithm>

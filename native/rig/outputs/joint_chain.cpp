@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Computes the skinning matrices of an armature's bones, parents before children. An Affine has the
+// upper three rows of a matrix; its fourth row is 0 0 0 1.
 #include "rig/outputs/joint_chain.h"
 
 #include <algorithm>

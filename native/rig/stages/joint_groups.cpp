@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The stage that takes most of the time: joint attributes as sums of the columns of active
-// controls.
+// controls. A control is active if it is not 0, a column has its coefficients in a joint group, a
+// group is active if it has a column of an active control, and a block is 16 consecutive joint
+// attributes.
 #include <algorithm>
 #include <bit>
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Neural networks: the operations of their graph, and the joints that they move.
+// Neural networks: the operations of their graph (gather reads controls, scatter writes controls),
+// and the joints that the networks move.
 // From: dna-format 12.3, 12.5
 #include <algorithm>
 #include <cmath>
