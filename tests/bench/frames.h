@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames of raw controls.
+// Frames of raw controls for benchmarks, generated or read from a file.
 #pragma once
 
 #include <algorithm>
