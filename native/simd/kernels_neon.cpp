@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The kernels for ARM NEON: gives the loops of kernels_body.h and skin_body.h their instructions on
+// The kernels for ARM NEON: instructions for the loops of kernels_body.h and skin_body.h, on
 // registers of four floats.
 #include <bit>
 

@@ -85,8 +85,9 @@ class Correctives {
   Correctives(const Rig& rig, Workspace& work, float* controls)
       : rig_(rig), work_(work), controls_(controls) {}
 
-  // Computes the watched correctives. In: active  controls that are not 0, without the correctives;
-  // kept  as in list_firing
+  // Computes the watched correctives.
+  // In: active  controls that are not 0, without the correctives
+  //     kept    the evaluation before had the same active controls
   void watched(std::uint32_t lod, std::span<const std::uint16_t> active, bool kept) noexcept {
     const auto rests = [this](std::uint16_t control) { return controls_[control] == 0.0f; };
     list_firing(rig_, lod, active, kept, work_, rests);
@@ -251,8 +252,8 @@ std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   return n;
 }
 
-// Computes a corrective of four frames. Products and roundings have the same order as in
-// corrective(). The result is 0 instead of NaN in frames in which a factor is 0.
+// Computes a corrective of four frames. Products and roundings have the same order as for a single
+// frame, in corrective(). The result is 0 instead of NaN in frames in which a factor is 0.
 // In: values  [controls, kFrames], from the first of the four frames on
 simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
                             const float* values) noexcept {

@@ -50,7 +50,8 @@ void run_layer(const Rig& rig, const MlLayer& layer, std::uint32_t rows, const f
   activate(layer, out, rows);
 }
 
-// Copies the values that an operation reads from other operations to one list, at most `most`.
+// Copies the values that an operation reads from other operations to one list of at most `most`
+// values.
 // Out: number of values
 std::uint32_t join(const Rig& rig, const MlOperation& op, const float* values, std::uint32_t most,
                    float* to) noexcept {
