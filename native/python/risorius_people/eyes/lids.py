@@ -266,7 +266,7 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     off = closed[ROOT, UPPER] - whole[ROOT, UPPER]
     outer = whole[:ROOT, UPPER] + _FADE[::-1, None, None] * off
     closed[:ROOT, UPPER] = outer
-    closed[:, LOWER] += (_AROUND * (1 - rows))[:, :, None] * way[:, LOWER]
+    closed[:, edge] += (_AROUND * (1 - rows))[:, :, None] * way[:, edge]
     closed[ROOT + 4, UPPER] = whole[ROOT + 4, UPPER]
     closed = lids.seated(closed)
     plain = _scaled(lids, blink)
