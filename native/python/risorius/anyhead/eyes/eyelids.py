@@ -380,9 +380,9 @@ class Eyelids:
         return lacks
 
     def _lifted(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """The points, moved away from the eye's centre until the lids are clear of the eye.
+        """The points; those too near to the eye are moved away from the eye's centre.
 
-        Neighbours of such points are moved too, with a smooth fall-off.
+        Neighbours of the moved points move too, with a smooth fall-off.
 
         Args:
             points: float64[n, 3], the vertices of the lids in a pose.
