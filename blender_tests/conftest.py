@@ -104,7 +104,7 @@ def _repository(installed):
 def mode(request):
     """The mode of the face: Direct mode, or posed bones with a shape key for each channel.
 
-    Test files about frames replace this fixture and add the mode with one live shape key.
+    Some test files replace this fixture, most to add the mode with one live shape key.
     """
     return request.param
 
@@ -120,7 +120,7 @@ def dna_file(tmp_path):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """List the tests that were skipped because their data or programs are missing."""
+    """Print the reasons of skipped tests whose data or programs are missing, each reason once."""
     reasons = {report.longrepr[2] for report in terminalreporter.stats.get("skipped", [])}
     for reason in sorted(r.removeprefix("Skipped: ") for r in reasons):
         if reason.startswith("EXTRA NOT RUN"):

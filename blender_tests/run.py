@@ -42,7 +42,11 @@ def _install(package: Path) -> None:
 
 
 def main() -> int:
-    """Prepare a throw-away user folder, install, and run pytest on this folder."""
+    """Run pytest on the named tests, else on this folder. Returns its exit code.
+
+    Before that, makes a throw-away user folder if BLENDER_USER_RESOURCES is not set, and installs
+    the package of --extension.
+    """
     made = None
     if "BLENDER_USER_RESOURCES" not in os.environ:
         # Blender reads this variable when it starts, so it is set before bpy is imported.

@@ -189,7 +189,7 @@ def part(name: str) -> ModuleType:
 
 @cache
 def regions() -> FaceRegions:
-    """The regions of a face; the object has no regions if the native module is missing."""
+    """The regions of a face; the object has no regions if the native module cannot be used."""
     if problem():
         return FaceRegions({}, lambda _: "", lambda _: "")
     known, sides = part("controls.regions"), part("controls.sides")
@@ -209,7 +209,7 @@ class LiveSource(TypedDict):
 
 @cache
 def live_sources() -> dict[str, LiveSource]:
-    """Programs that send captured faces, by name; empty without the native module.
+    """Programs that send captured faces, by name; empty if the native module cannot be used.
 
     Blender needs these names when it starts. To be quick, this reads only the TOML file and loads
     no receiver.
@@ -221,7 +221,7 @@ def live_sources() -> dict[str, LiveSource]:
 
 
 def dna_error() -> type[Exception]:
-    """The class of errors about bad DNA files; without the native module, `_Never`."""
+    """The class of errors about bad DNA files; `_Never` if the native module is missing."""
     return _risorius.DnaError if _risorius is not None else _Never
 
 

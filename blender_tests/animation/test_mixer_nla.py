@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""risorius.Mixer equals Blender's NLA at every frame, for settings that both have."""
+"""Tests that risorius.Mixer equals Blender's NLA at every frame, for settings that both have."""
 
 import bpy
 import numpy as np
@@ -91,7 +91,8 @@ def new_face():
     return face
 
 
-# Name -> pairs of Blender's strips and our layers, the lowest first.
+# Name -> (seed of the clip, settings of Blender's strip, settings of our layer) of each layer, the
+# lowest first.
 STACKS = {
     "replace": [(1, {}, {})],
     "add": [
@@ -207,7 +208,7 @@ STACKS = {
         ),
     ],
 }
-# Strip number -> channels that the strip's action lacks. The mask of its layer excludes them too.
+# Seed of a clip -> channels that the strip's action lacks. The mask of our layer excludes them too.
 LACKS = {2: ("b",), 3: ("a", "d")}
 
 

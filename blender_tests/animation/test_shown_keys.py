@@ -42,7 +42,7 @@ def _other_armature():
 
 
 def test_a_key_is_seen_whatever_was_selected_before(rig):
-    """Keys stay visible after an import, with another bone, the head, a body or nothing selected.
+    """Key All makes its keys visible, also if another bone, the head, a body or nothing is chosen.
 
     Outside pose mode keys of head and eyes are visible too, so that moving a column of keys moves
     all of them.

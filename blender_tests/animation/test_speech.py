@@ -17,7 +17,7 @@ LENGTH = 0.1  # seconds per sound
 
 
 def heard():
-    """A voice of 1.3 s with two words, a pause, and a third word."""
+    """A voice of 1.3 s: three words, with silence before, between and after them."""
     phones = []
     for i, said in enumerate(SAID):
         name, _, word = said.partition(".")
@@ -82,7 +82,7 @@ def test_a_voice_has_as_few_keys_as_its_curves_need(rig):
 
 
 def test_a_layer_shows_the_voice_at_every_frame(rig):
-    """Layers, export and bake read F-curves with Bezier handles as exactly as straight lines."""
+    """A layer reads an F-curve with Bezier handles, within the tolerance of the fitted keys."""
     wanted = speech.animate(heard(), rate=24.0).curve(JAW)
     bpy.ops.risorius.speak(filepath="bob.wav", target="LAYER", start=11.0, use_sound=False)
     (layer,) = scene.controls(rig).risorius_layers

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves that no mapping contains: assigned in Blender, saved as a mapping, imported again."""
+"""Tests curves that no mapping contains: assigned in Blender, saved as a mapping, imported."""
 
 import bpy
 import pytest

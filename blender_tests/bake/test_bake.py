@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that baked faces move like unbaked faces, by actions only, and can be unbaked."""
+"""Tests that baked faces move like unbaked faces, and can be unbaked.
+
+A bake of the kind RESULT moves bones, shape keys and maps by actions, without the evaluator. A bake
+of the kind CONTROLS moves the controls by an action, and the evaluator still moves the face.
+"""
 
 import addon_utils
 import bpy
@@ -45,7 +49,11 @@ def _bake(rig=None, **options):
 
 
 def _state(rig):
-    """All animation data of a character, and its shape keys, as plain values."""
+    """Actions, NLA tracks, drivers and shape keys of a character, and which meshes are hidden.
+
+    All are plain values for comparisons. Keyframes and strips are not contained, only the number of
+    strips of each track.
+    """
     owners = [rig, scene.controls(rig)]
     owners += [m.data.shape_keys for m in scene.meshes(rig).values() if m.data.shape_keys]
     found = []
@@ -131,7 +139,10 @@ def test_back_to_live_is_exact_also_after_save_and_load(mode, dna_file, tmp_path
 
 
 def _complicate(rig):
-    """Add NLA strips, a driver, a constraint, a body, a bone and shape keys of the user."""
+    """Add a strip, a driver, a constraint, and animation of a bone and a shape key of the user.
+
+    Keys of the control armature's location are added to the strip.
+    """
     controls = scene.controls(rig)
     data = controls.animation_data
     base = data.action
@@ -197,7 +208,7 @@ def test_baked_controls_are_one_clean_action(mode, dna_file):
 
 
 def _add_layers(rig):
-    """Add a layer with an animated weight, a layer that rotates the head, and a reaction."""
+    """Add a layer with an animated weight; the layer moves two controls and turns the head."""
     controls = scene.controls(rig)
     own = controls.animation_data.action
     controls.animation_data.action = None

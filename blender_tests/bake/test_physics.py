@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulations and other readers see the face of the current frame, without side effects."""
+"""Tests that simulations and other readers see the face of the current frame, and no more."""
 
 import bpy
 import numpy as np
@@ -25,7 +25,10 @@ def mode(request):
 
 
 def _has_maps_of_the_frame(rig, item):
-    """Check that the material of a simulated mesh reads the animated maps of each frame."""
+    """Check that the material of a simulated mesh reads the first animated map of the frame.
+
+    The values at frames 1 and 4 must also differ.
+    """
     assert "maps" in item
     material, seen = item.data.materials[0], []
     for frame in (1, 4):
@@ -62,7 +65,7 @@ def test_free_cloth_falls_as_on_a_face_of_plain_actions(mode, dna_file):
     modifier = simulations.cloth(item, pinned=0.5)
     found = simulations.film(
         item, FRAMES[:5]
-    )  # it amplifies the last bits of its mesh in each frame
+    )  # free cloth amplifies the last bits of its mesh in each frame
     item.modifiers.remove(modifier)
     assert bpy.ops.risorius.bake() == {"FINISHED"}
     simulations.cloth(item, pinned=0.5)

@@ -11,12 +11,12 @@ from support import scene
 from support.faces import small_face
 
 SIDE = 96
-PICTURE = 30_000  # smallest size in bytes of a PNG with noise
-METADATA = 300_000  # bytes of metadata that cannot be compressed
+PICTURE = 30_000  # approximate size in bytes of a PNG of SIDE x SIDE random pixels
+METADATA = 300_000  # bytes of random metadata, which are hard to compress
 
 
 def _picture(path, seed):
-    """Write a PNG with noise. Returns its pixels as Blender reads them."""
+    """Write a PNG with random pixels to `path`; the same `seed` gives the same pixels."""
     image = bpy.data.images.new("noise", SIDE, SIDE, alpha=False)
     noise = np.random.default_rng(seed).random((SIDE * SIDE, 4), np.float32)
     noise[:, 3] = 1.0

@@ -38,7 +38,7 @@ def _same_in_both_modes(rig, atol=2e-6):
 
 
 def _own_key(rig, name="own"):
-    """A shape key of the user with every setting that a key has."""
+    """A shape key of the user with a moved point, a value, a range and a mask."""
     head = _head(rig)
     block = head.shape_key_add(name=name, from_mix=False)
     block.points[3].co.z += 0.02
@@ -202,7 +202,7 @@ def test_a_driven_key_set_by_hand_is_not_stuck(dna_file):
 
 
 def _channel_of(rig, path, name, value):
-    """Largest coordinate difference from the oracle's vertices with one channel at `value`."""
+    """Largest coordinate difference of both meshes from the oracle with one channel at `value`."""
     import risorius
     from support import oracle
 

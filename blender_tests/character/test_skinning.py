@@ -2,8 +2,8 @@
 """Blender's vertices equal those of an independent NumPy implementation for the same controls.
 
 The NumPy side computes pose, morph and skinning in float64 from the format's description
-(tests/python/support/oracle.py, support/oracle.py). The tests compare all levels of
-detail, both shape modes, edits, playback, frames of a render engine, and subframes.
+(tests/python/support/oracle.py, support/oracle.py). The tests compare all levels of detail, three
+ways to pose and shape a face, edits, playback, frames of a render engine, and subframes.
 """
 
 import importlib.util

@@ -392,7 +392,10 @@ def test_without_room_the_old_file_stays(kind, dna_file, tmp_path, monkeypatch):
 
 @contextlib.contextmanager
 def _no_room(kind, monkeypatch):
-    """Limit every file to some bytes, which simulates a full disk."""
+    """Limit every file to 4000 bytes, which simulates a full disk.
+
+    For Alembic, a function that writes a few bytes and fails replaces the export function.
+    """
     import resource
     import signal
 

@@ -113,7 +113,7 @@ def test_another_program_finds_colours_names_and_time(kind, tmp_path, capfd):
 
 
 def _is_quiet(captured):
-    """Whether only the operator's report and one line of an exporter in C were printed."""
+    """Check that only the report of the operator (`Info: out.…`) and empty lines were printed."""
     lines = [x for x in captured.out.splitlines() if x.strip()]
     assert captured.err == ""
     assert [x for x in lines if not x.startswith("Info: out.")] == []

@@ -340,7 +340,8 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
     after = oracle.vertices(dna, 0, risorius.Rig(dna).evaluate(moved))
     still = np.linalg.norm(after - before, axis=1) < 1e-6
     assert 0.3 < still.mean() < 0.7
-    # The picture shows the face from the front, and is 1.05 times as large as its largest side.
+    # The picture shows the face from the front. Its side is 1.05 times the width or height of the
+    # face, whichever is larger.
     low, high = before.min(axis=0), before.max(axis=0)
     half = 1.05 * (high - low)[[0, 2]].max() / 2
     edge = (before[still, 2].min() - (low + high)[2] / 2) / half  # -1 to 1

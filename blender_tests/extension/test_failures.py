@@ -238,7 +238,11 @@ def test_damaged_data_in_the_blend_is_said_once(dna_file, mode, capsys):
 
 
 def _plant_sample(monkeypatch, tmp_path, dna_file, error=None):
-    """Set up a user folder of the extension, and a builder of samples that copies a small face."""
+    """Set up a user folder of the extension, and a builder of samples that copies a small face.
+
+    The builder raises `error` instead if that is given. Returns: a list that receives the options
+    of each call of the builder.
+    """
     import shutil
 
     import risorius_people as sample

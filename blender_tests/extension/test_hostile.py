@@ -134,7 +134,7 @@ def test_a_face_that_left_is_not_kept(tmp_path):
 
 
 def _draw_panels():
-    """Draw every panel of the sidebar. Returns the shown texts."""
+    """Draw the panels of ui.face.panel and ui.face.controls_panel. Returns the shown texts."""
     said = []
     face = "ui.face"
     for panel in (

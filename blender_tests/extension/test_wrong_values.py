@@ -68,7 +68,7 @@ TOGETHER = [
 
 @pytest.fixture
 def rig(tmp_path):
-    """A small face with LODs and an action, in a .blend with another object and a text."""
+    """A small face with LODs and an action, beside a mesh with a landmark, an empty and a text."""
     path = tmp_path / "small.dna"
     small_face(head_grid=(5, 6)).save(str(path))
     found = scene.load(path, "LIVE", lods=(True,) * 8)

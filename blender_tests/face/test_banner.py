@@ -42,7 +42,7 @@ def _banner(rig):
 
 
 def _done(mode):
-    """Click on Done."""
+    """Run the operator of the button Done."""
     return getattr(bpy.ops.risorius, mode.operator.partition(".")[2])(**mode.settings)
 
 

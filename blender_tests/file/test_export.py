@@ -56,7 +56,8 @@ def test_untouched_files_of_every_version(mode, tmp_path):
 def test_untouched_golden_files(tmp_path):
     """Unedited DNA files of another program are exported byte for byte.
 
-    Files without a face are skipped: they are refused on import.
+    Files that are refused on import are skipped: those without a face, or of a generation
+    that cannot be read.
     """
     seen = 0
     for source in sorted(GOLDEN.glob("*.dna")):
@@ -98,7 +99,11 @@ def test_edits_come_back_in_every_convention(tmp_path, conventions):
 
 
 def _only_these_changed(source, out, step):
-    """Check that three vertices differ by multiples of `step`, and that all else is identical."""
+    """Check what differs between two DNA files.
+
+    A position and the deltas of one vertex in each of two shapes differ by multiples of `step`.
+    All else is identical.
+    """
     old, new = risorius.load(str(source)), risorius.load(str(out))
     one, two = old.meshes[0], new.meshes[0]
     moved = oracle.to_blender(new, (two.positions.astype(float) - one.positions))

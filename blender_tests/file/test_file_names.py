@@ -209,7 +209,7 @@ def test_an_image_without_a_path_is_written_beside_the_usd(rig, tmp_path):
 
 
 def _painted(name, folder):
-    """A material that shows an image, without shading."""
+    """A material whose colour is a packed image with an odd path; its name is `name`, too."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree

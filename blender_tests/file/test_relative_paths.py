@@ -32,7 +32,10 @@ OF_HEADS = (
 
 
 def _calls(folder):
-    """Operator -> [(arguments with `//` paths, file that it must write in the folder, or "")]."""
+    """Operator -> [(arguments with `//` paths, file that it must write in the folder, or "")].
+
+    For `speak`, the value is the arguments only.
+    """
     risorius.Clip([JAW], [[0.0, 0.5]], 24.0).save(folder / "take.rzc")
     opened = 0.8 * (np.arange(240) % 60 < 20)
     risorius.Clip([JAW], [opened], 60.0).save(folder / "opens.rzc")
@@ -73,7 +76,7 @@ def _calls(folder):
 
 
 def _head():
-    """Add an active mesh with a shape key from which a rig can be made."""
+    """Add a mesh with a shape key from which a rig can be made."""
     mesh = bpy.data.meshes.new("Head")
     places = [(x, y, z) for x in (-0.1, 0.1) for y in (0, 0.1) for z in (0, 0.1, 0.2)]
     mesh.from_pydata(places, [], [(0, 1, 4, 3), (1, 2, 5, 4), (6, 7, 10, 9), (7, 8, 11, 10)])

@@ -10,7 +10,7 @@ from support import scene
 from support.animation import animate
 
 FRAMES = (1, 4, 7)
-ORDERS = ((7, None), (4, None), (1, None), (7, 1), (1, 4), (4, 10))  # frame, the one before it
+ORDERS = ((7, None), (4, None), (1, None), (7, 1), (1, 4), (4, 10))  # frame, frame shown before
 SIZE = 48
 NOISELESS = 1.01 / 255
 
@@ -58,7 +58,7 @@ def _render_animation(setup, folder):
 
 
 def _render_frame(setup, folder, frame, before=None):
-    """Render a frame, after another frame was shown."""
+    """Render a frame; if `before` is given, that frame is shown first. Returns the pixels."""
     if before is not None:
         setup.frame_set(before)
     setup.frame_set(frame)
@@ -68,7 +68,15 @@ def _render_frame(setup, folder, frame, before=None):
 
 
 def _look_the_same(setup, folder, orders=ORDERS):
-    """Check that the frames look the same in every order. Returns their pixels."""
+    """Check that frames look the same in two animations and alone, after other frames.
+
+    Args:
+        setup: scene to render.
+        folder: folder of the pictures.
+        orders: (frame, the frame that is shown before it, or None).
+
+    Returns: frame -> pixels in the first animation.
+    """
     animated = _render_animation(setup, folder)
     for frame, before in orders:
         alone = _render_frame(setup, folder, frame, before)

@@ -130,7 +130,7 @@ def test_roots_stand_between_the_cards_too(haired):
     assert np.ptp(roots @ along / (along @ along)) > 0.3
 
 
-_DARK = 0.1  # a stored value, as in textures of brows
+_DARK = 0.1  # stored red, green and blue, as in textures of brows
 
 
 def test_strands_of_brows_are_no_black_wires(tmp_path):
@@ -166,7 +166,7 @@ RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm, mm, strands per lock, locks p
 
 @pytest.fixture
 def curly(tmp_path):
-    """Returns a function that makes a face like `haired` whose metadata ask for coiled hair."""
+    """Returns a function that makes a face with cards whose metadata ask for coiled hair."""
 
     def made(words):
         dna = small_face()

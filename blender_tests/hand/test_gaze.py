@@ -103,7 +103,7 @@ def target_point(rig):
 
 
 def move_target(rig, x, y, z):
-    """Move the target along the world's axes by shares of its distance from the eyes."""
+    """Move the target along the control armature's axes by shares of its distance from the eyes."""
     bone = target(rig)
     rest = bone.bone.matrix_local.to_3x3()
     far = abs(bone.bone.head_local.y - scene.controls(rig).data.bones["eye_L"].head_local.y)
@@ -213,7 +213,7 @@ def test_an_object_that_is_not_there_is_named(rig):
 
 @pytest.fixture
 def body(rig):
-    """A rotated body with base, neck and head bones at the places of the face's bones."""
+    """A body to which the face is attached: its neck and head bones start where the face's do."""
     data = bpy.data.armatures.new("body")
     body = bpy.data.objects.new("body", data)
     bpy.context.scene.collection.objects.link(body)

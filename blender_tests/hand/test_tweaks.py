@@ -18,7 +18,10 @@ def path_of(name):
 
 @pytest.fixture
 def rig(dna_file):
-    """A face with jaw keys of all kinds at frames 1, 15 and 40, and a tweak of frames 10 to 30."""
+    """A face with jaw keys at frames 1, 15 and 40, and a tweak of frames 10 to 30.
+
+    The first key has a free handle.
+    """
     rig = scene.load(dna_file)
     for frame, value in ((1, 0.2), (15, 0.3), (40, 0.6)):
         scene.face(rig)[PREFIX + JAW] = value
@@ -43,7 +46,7 @@ def action_of(rig):
 
 
 def below(rig):
-    """All properties of the keys in the face's action."""
+    """Path, place, handles and types of the keys in the face's action."""
     if action_of(rig) is None:
         return []
     return [
@@ -255,7 +258,7 @@ def turning(dna_file):
 
 @pytest.mark.parametrize("keyed", [True, False])
 def test_bones_of_head_neck_and_eyes_go_into_the_tweak(turning, keyed):
-    """Rotations go into the tweak with and without keyframes, and a bake contains them."""
+    """Moves go into the tweak with and without keyframes. A bake contains those with keyframes."""
     before, base = below(turning), {f: seen(turning, f) for f in (5, 35)}
     stood = {n: tuple(getattr(pose_bone(turning, n), BONES[n][0])) for n in BONES if n != "head"}
     go(turning, 20)

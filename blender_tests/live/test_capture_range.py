@@ -30,9 +30,9 @@ def table(path, **curves):
 
 @pytest.fixture(scope="module")
 def rom(tmp_path_factory):
-    """A take with all extremes.
+    """A take in which jaw and smiles reach their extremes.
 
-    The jaw reaches 0.8, the smiles 0.7 with 0.05 at rest, and a brow hardly moves.
+    The jaw reaches 0.8, the smiles 0.7 with 0.05 at rest. A brow hardly moves.
     """
     smile = 0.05 + bump(150, 110, 0.65)
     return table(

@@ -500,7 +500,10 @@ for image in bpy.data.images:
 
 @pytest.mark.parametrize("data", ["Utility - Raw", "ACES - Linear"])
 def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
-    """Colour configurations like ACES have no `sRGB` and `Non-Color`; one has no data role."""
+    """Colour configurations like ACES have no `sRGB` and `Non-Color`.
+
+    In one of them, the role `data` is a colour space that is not for data.
+    """
     path = _save(tmp_path, _mapped("head_wm1_normal.head_wm1_blink_L"))
     _write_maps(tmp_path / "Maps", WHOLE, mask_left=True)
     config = tmp_path / "config.ocio"
@@ -511,7 +514,7 @@ def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
     spaces = {w[1]: (w[2], " ".join(w[3:])) for w in map(str.split, said.splitlines())
               if w[:1] == ["SPACE"]}  # fmt: skip
     for name in ("head_normal_map.png", "head_wm1_normal_map.png"):
-        # Blender sets `is_data` by the role only, so without a role only the name is tested.
+        # Blender sets `is_data` by the role only, so with the wrong role only the name counts.
         assert spaces[name] == (str(data == "Utility - Raw"), "Utility - Raw"), said
     assert spaces["head_color_map.png"] == ("False", "Utility - sRGB - Texture"), said
 
@@ -590,9 +593,9 @@ def _corner_normals(item):
 
 
 def test_map_drivers_are_plain_sums(tmp_path):
-    """Drivers of the animated maps of a duplicated face are sums without Python expressions.
+    """Drivers of animated maps are sums without Python expressions.
 
-    scene/upkeep/duplicates.py makes them.
+    scene/material/skin_material.py makes them.
     """
     rig = scene.load(_save(tmp_path, _mapped("head_wm2_normal.head_wm2_browsDown_L")))
     drivers = list(scene.submodule("scene.material.materials").map_drivers(_materials(rig)["head"]))

@@ -8,14 +8,15 @@ from support import child, looks, scene
 from support.faces import _mesh as fine_mesh
 from support.faces import small_face
 
-SKIN = (0.8, 0.5, 0.2)  # stored value of the colour texture
+SKIN = (0.8, 0.5, 0.2)  # red, green and blue stored in the head's colour texture
 HAIR, THIN = (0.5, 0.4, 0.4), 0.15  # colour of brows, and the share of their cards that hair covers
 
 
 def _face(tmp_path, color=True):
-    """A face for the solid view: a head with a mask and perhaps a colour texture, and a fine eye.
+    """Save a face for the solid view: a head with a mask, teeth, and a fine eye.
 
-    Lashes, a film and brows of thin grey hair are in front of the eye.
+    Lashes, a film and brows are in front of the eye. If `color`, the head has a colour texture and
+    the brows have one of thin hair. Returns: the path of the file.
     """
     face = small_face()
     random = np.random.default_rng(5)

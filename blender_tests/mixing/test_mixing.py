@@ -19,7 +19,7 @@ def to_blender(points):
 
 @pytest.fixture
 def files(tmp_path):
-    """A folder with the files of a face and of a wider copy with a longer nose."""
+    """A folder with a face, a wider and deeper copy, and a copy of this with a renamed joint."""
     dna = risorius.load(MEDIUM)
     dna.save(tmp_path / "one.dna")
     meshes = []

@@ -65,7 +65,7 @@ def test_groups_of_no_bone_and_of_a_bone_that_does_not_deform(tmp_path):
 
 @pytest.mark.parametrize("scale", [(0.0, 0.0, 0.0), (1.0, 0.0, 2.0), (1e-9, 1e-9, 1e-9)])
 def test_a_bone_of_no_size(tmp_path, scale):
-    """A script scales an unmoved joint to 0, so its matrix has no inverse."""
+    """A script scales an unmoved joint to 0 in one or all directions, or nearly to 0."""
     pair = _pair(small_face(), tmp_path)
     for rig in pair.each():
         rig.pose.bones["user_joint"].scale = scale

@@ -405,7 +405,10 @@ def test_an_edited_rest_form(pair):
 
 
 def test_sliders_and_frames_look_at_nothing_again(pair, monkeypatch):
-    """Plans and weights are read only after edits, because reading takes longer than a frame."""
+    """Plans and weights are read only after edits, because reading takes longer than a frame.
+
+    A moved slider causes at most a quick look.
+    """
     conditions, skins = (scene.submodule(f"scene.skinning.{n}") for n in ("conditions", "skins"))
     animation.animate(pair.direct)
     bpy.context.scene.frame_set(2)
@@ -550,7 +553,7 @@ def test_another_number_of_vertices(pair):
 
 
 def test_a_modifier_that_was_disabled_before_direct_mode(pair):
-    """Neither the mode Automatic nor a save enables a modifier that the user disabled before."""
+    """The mode Automatic does not enable a modifier that the user disabled before."""
     rig, head = pair.live, scene.meshes(pair.live)[0]
     _armature(head).show_viewport = False
     both_ways.settle()

@@ -91,7 +91,7 @@ class Pair:
         return done
 
     def apart(self, lod=0):
-        """Largest coordinate difference of vertices in armature space, as a share of face size."""
+        """Largest coordinate difference of vertices in armature space / size of the face."""
         found = []
         for rig in self.each():
             place = np.linalg.inv(np.array(rig.matrix_world))

@@ -16,7 +16,7 @@ _METRES = 0.01
 
 
 def egg():
-    """Add the head as active object. It faces -y, with a key per expression of face_shapes."""
+    """Add the head as active object, facing -y, with a shape key per expression of face_shapes."""
     positions, faces = face_shapes.head()
     mesh = bpy.data.meshes.new("Egg")
     mesh.from_pydata(_to_blender(positions).tolist(), [], faces.tolist())

@@ -4,7 +4,8 @@
     blender -b --python extension_steps.py -- STEP [ARGUMENTS]
     python extension_steps.py -- STEP [ARGUMENTS]
 
-It prints its result as one line of JSON after `RESULT `. An exception gives exit code 1.
+The script prints the result of the step as one line of JSON after `RESULT `. An exception gives
+exit code 1.
 """
 
 import json
@@ -21,7 +22,11 @@ MODULE = "bl_ext.user_default.risorius"
 
 
 def of_ours():
-    """The add-on's handlers, classes, operators, properties and menus that this process has."""
+    """The add-on's parts that are registered in this process.
+
+    Names of its preferences, handlers, classes, operators and properties, and the number of its
+    entries in the menus Import and Add.
+    """
     handlers = [
         name
         for name in dir(bpy.app.handlers)

@@ -21,11 +21,17 @@ JOINTS = ("spine_04", "neck_01", "head", "FACIAL_C_Jaw", "FACIAL_L_Eye", "user_j
 PARENTS = (0, 0, 1, 2, 2, 2, 5)
 CHANNELS = 6
 HEAD, JAW, EYE = 2, 3, 4
-UNOWNED = 5
+UNOWNED = 5  # a joint that no joint group moves
 
 
 def _grid(columns, rows, radius, center):
-    """Positions, normals, UVs and quads of a patch of a sphere that faces the DNA's front (+z)."""
+    """Positions, normals, UVs and quads of a patch of a sphere that faces the DNA's front (+z).
+
+    Args:
+        columns, rows: numbers of vertices.
+        radius: radius of the sphere in the DNA's unit.
+        center: float[3], centre of the sphere.
+    """
     u, v = np.meshgrid(np.linspace(-1.2, 1.2, columns), np.linspace(-1.2, 1.2, rows))
     u, v = u.ravel(), v.ravel()
     unit = np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=1)
@@ -77,7 +83,14 @@ def small_face(
     translation_unit="cm",
     head_grid=(12, 14),
 ):
-    """A Dna with every kind of data that the add-on imports; it is the same in every call."""
+    """A Dna with all data that the add-on imports except RBF poses; equal arguments, equal Dna.
+
+    Args:
+        name: name of the face.
+        axes, rotation_sequence, rotation_signs, rotation_unit, translation_unit: conventions of the
+            file.
+        head_grid: columns and rows of vertices of the head mesh.
+    """
     random = np.random.default_rng(7)
     dna = risorius.Dna()
     dna.name, dna.lod_count, dna.max_lod = name, 2, 0
@@ -172,8 +185,7 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
     Args:
         dna: a small_face.
         joints, controls, channels, maps: the new order, as old indices and names of new items.
-            Items
-            that are not in it are removed with their data. None: no change.
+            Old items that the order lacks are removed with their data. None: no change.
 
     Returns:
         The same Dna.
@@ -290,7 +302,7 @@ def other_face(**options):
 
 
 TURNING = tuple(f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw")
-UP, SIDE = 1, 2  # poses of neck_face
+UP, SIDE = 1, 2  # indices in NECK_POSES of two poses of neck_face
 # Quaternions x y z w of neck_01 and then head in each pose, relative to rest, in the joints' axes.
 NECK_POSES = (
     (0, 0, 0, 1, 0, 0, 0, 1),

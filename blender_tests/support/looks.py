@@ -8,6 +8,7 @@ from mathutils import Vector
 
 from .faces import small_face
 
+# Mesh name without LOD -> kind of the mesh, see plans.kind_of.
 KINDS = {
     "head": "skin",
     "body": "skin",
@@ -54,7 +55,7 @@ def set_meshes(dna, meshes):
 
 
 def every_kind():
-    """A face with one mesh of each kind in KINDS, which MetaHumans have."""
+    """A face with one mesh for each name in KINDS; MetaHumans have meshes with these names."""
     dna = small_face()
     patch = dna.meshes[1]
     meshes = {"head_lod0_mesh": dna.meshes[0]}
@@ -86,7 +87,13 @@ def halves(left, right, size=16):
 
 
 def stage(items, size=32, engine="CYCLES", samples=4):
-    """Light the scene evenly and look at some objects from the front (-y).
+    """Light the scene by two suns, and look at some objects from the front (-y).
+
+    Args:
+        items: the objects to show.
+        size: width and height of the render in pixels.
+        engine: render engine.
+        samples: samples per pixel.
 
     Returns:
         The scene, and the x and z coordinates that each pixel shows: float[size, size] each.

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A fake UILayout that finds texts which Blender would cut off.
 
-It calculates the widths of Blender's layouts at an interface scale of 1 with Blender's font. Each
-part of a column has the column's width. A row divides its width in proportion to the widths that
-its parts request, and a split by its factor. With use_property_split, names get the left two
-fifths of the width.
+The fake layout calculates the widths of Blender's layouts at an interface scale of 1 with
+Blender's font. Each part of a column has the column's width. A row divides its width in proportion
+to the widths that its parts request, and a split by its factor. With use_property_split, names get
+the left two fifths of the width.
 """
 
 from types import SimpleNamespace
@@ -19,7 +19,7 @@ _MARGIN = 10  # pixels around the text of a label; a button has more
 _BUTTON = 14
 _ICON = 20
 _ASKED = 30  # pixels that a button requests from a row in addition to its text
-_NUMBER = 60  # the same for a number field
+_NUMBER = 60  # pixels that a number field requests in addition to its text
 _NAMES = 0.4
 _VALUE = "0.000"
 # Heights in pixels, measured in a window of Blender 4.3, where they are larger than in 5.2.

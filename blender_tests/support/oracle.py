@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Computes skinning and morphing in float64 from the description of the format alone.
 
-It uses no code of the add-on: it takes a Pose and returns vertices in Blender's axes and metres.
+This module uses no code of the add-on: it takes a Pose and returns vertices in Blender's axes and
+units.
 """
 
 import numpy as np
@@ -13,7 +14,12 @@ _AXES = {
 
 
 def _rotation(dna, angles):
-    """Rotation matrix for column vectors; the first axis of the rotation sequence acts first."""
+    """Rotation matrix for column vectors; the first axis of the rotation sequence acts first.
+
+    Args:
+        dna: gives unit, order and signs of the rotations.
+        angles: float64[3], in the DNA's unit.
+    """
     if dna.rotation_unit == "degrees":
         angles = np.radians(angles)
     matrix = np.eye(3)

@@ -44,10 +44,10 @@ def plain_head(name="Egg"):
 
 
 class Package:
-    """Replaces the functions of risorius that search landmarks on heads.
+    """Replaces the functions of scene/anyhead/finding.py that call risorius to find landmarks.
 
     Attributes:
-        places: name -> landmark that the fake search finds, in centimetres.
+        places: name -> landmark that the fake search finds, in centimetres with y up.
         heads: the finding.Head of each search.
     """
 
@@ -74,7 +74,7 @@ class Onto(Package):
     """Also replaces the functions that transfer expressions (here only jawOpen) and conform a face.
 
     Attributes:
-        asked: arguments of each call.
+        asked: (template's Dna, Transfer) of each transfer, (Dna, finding.Head) of each conforming.
     """
 
     def __init__(self, monkeypatch):

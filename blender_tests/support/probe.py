@@ -14,8 +14,10 @@ class Probe(bpy.types.RenderEngine):
     bl_label = "Probe"
     bl_use_preview = False
 
-    seen = {}  # frame -> {mesh index: float64[V, 3] in world space}
-    between = ()  # offsets in frames at which it also records
+    # frame -> {mesh index: float64[V, 3] in world space}. With `between`, the frame is recorded
+    # again at the end, as frame + 1e-9.
+    seen = {}
+    between = ()  # offsets from the frame, in frames, at which the engine also records
 
     def render(self, depsgraph):
         frame = depsgraph.scene_eval.frame_current
@@ -46,7 +48,12 @@ def _vertices(item):
 
 @contextmanager
 def rendering(setup, between=()):
-    """Context manager: renders of a scene use the probe. Yields the dict that they fill."""
+    """Context manager: renders of a scene use the probe. Yields the dict that they fill.
+
+    Args:
+        setup: the scene.
+        between: offsets in frames at which vertices are recorded too.
+    """
     bpy.utils.register_class(Probe)
     before = setup.render.engine
     Probe.seen = {}

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads exported files without Blender: trimesh, Assimp, OpenUSD and Alembic's own library.
 
-readers.py KIND FILE prints one JSON object. It runs in a separate process, because Blender's and
-the package's copies of OpenUSD or Alembic may conflict in one process.
+readers.py KIND FILE prints one JSON object. The script runs in a separate
+process, because Blender's and the package's copies of OpenUSD or Alembic may conflict in one
+process.
 
     meshes       name -> points [V][3] at rest, material, colors [V][4] if it has a texture
     names        names of all other elements: armatures, bones, shape keys, takes
-    opaque       material -> whether it is opaque
-    begin, end   range of the animation in seconds
-    up, metres   up axis, and metres per unit
+    opaque       material -> whether it is opaque; empty for Alembic
+    begin, end   range of the animation in seconds; FBX: from 0
+    up, metres   up axis, and metres per unit; read from USD files only, otherwise the convention
+                 of the format
 """
 
 import base64

@@ -85,7 +85,14 @@ def raw_of(rig, path):
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
     """Largest coordinate difference between Blender's and the oracle's vertices of a face.
 
-    It is relative to the mesh's size. The armature may have any transform.
+    The difference is divided by the size of the mesh. The armature may have any transform.
+
+    Args:
+        rig: deforming armature.
+        path: the face's DNA file.
+        raw: float32[R], raw controls for the oracle.
+        lod: level of detail to compare.
+        unit_scale: metres per Blender unit.
     """
     place = np.array(rig.matrix_world)
     dna = risorius.load(str(path))
@@ -116,7 +123,7 @@ def pose_bones(rig):
 
 
 def snapshot(rig):
-    """Vertices of all meshes of a character, concatenated, float64[V, 3]."""
+    """Evaluated vertices of all meshes of a face in world space, concatenated, float64[V, 3]."""
     return np.concatenate([evaluated(m) for _, m in sorted(meshes(rig).items())])
 
 
@@ -130,7 +137,10 @@ def counts():
 
 
 def invalid_drivers():
-    """(object name, data path) of invalid drivers in the .blend, and the number of all drivers."""
+    """(owner's name, data path) of each invalid driver in the .blend, and the number of drivers.
+
+    Owners are objects, shape keys and node trees of materials.
+    """
     owners = [
         *bpy.data.objects,
         *bpy.data.shape_keys,

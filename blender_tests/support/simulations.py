@@ -22,13 +22,19 @@ def film(item, frames=FRAMES):
 
 
 def apart(film, wanted):
-    """The largest coordinate difference between two films, as a share of the mesh's size."""
+    """The largest coordinate difference between two films, divided by the mesh's size."""
     size = np.ptp(wanted[min(wanted)], axis=0).max()
     return max(float(np.abs(film[f] - wanted[f]).max()) for f in wanted) / size
 
 
 def moving(dna_file, mode, far=0.2):
-    """(armature, meshes[0]) of a face with keys on jaw, head bone and location of the controls."""
+    """(armature, DNA mesh 0) of a face with keys of sliders, head bone and its controls' place.
+
+    Args:
+        dna_file: path of the DNA file.
+        mode: shape mode of the import.
+        far: distance in x by which the controls move, in Blender units.
+    """
     rig = scene.load(dna_file, mode)
     controls = animate(rig)
     for frame, x in ((1, 0.0), (6, far), (10, far / 2)):

@@ -21,7 +21,15 @@ class WrongFaceError(AssertionError):
 
 
 class World:
-    """Random actions on the open file. It stores no Blender objects, because undo replaces them."""
+    """Random actions on the open file.
+
+    A World stores no Blender objects, because undo replaces them.
+
+    Args:
+        folder: folder for the files of the run.
+        seed: seed of the random choices.
+        characters: number of characters at the beginning.
+    """
 
     def __init__(self, folder, seed, characters):
         self.folder, self.seed, self.characters = folder, seed, characters
@@ -417,11 +425,14 @@ class World:
     def check(self):
         """Compare all faces of the scene with the oracle, and check all drivers.
 
+        An override that Blender has locked is first repaired by the panel's operator.
+
         Returns:
             The largest error, relative to the mesh's size.
 
         Raises:
-            WrongFaceError: a driver is invalid, or a face differs by more than TOLERANCE.
+            WrongFaceError: a driver is invalid, no face is left, or a face differs by TOLERANCE or
+                more.
         """
         bad, _ = scene.invalid_drivers()
         if bad:
@@ -445,7 +456,10 @@ class World:
         return worst
 
     def _error(self, rig):
-        """(largest difference from the oracle as a share of the mesh's size, the mesh's name)."""
+        """(largest difference from the oracle / size of the mesh, name of the mesh).
+
+        The name is "its place" if the matrices of rig and controls differ more, in Blender units.
+        """
         dna, evaluator, _ = self._oracles[rig["risorius_dna"]["risorius_hash"]]
         depsgraph = bpy.context.evaluated_depsgraph_get()
         bone = rig["risorius_controls"].evaluated_get(depsgraph).pose.bones["face"]
@@ -519,4 +533,5 @@ WEIGHTS = {
     "render": 6, "unkey": 15,
     "disable_and_enable": 10, "lod_by_distance": 12, "place": 15, "attach": 12, "test_channel": 15,
 }  # fmt: skip
+# Actions after which soak.py pushes no undo step.
 NOT_PUSHED = {"undo", "redo", "save", "save_and_load", "revert"}

@@ -30,7 +30,7 @@ def _said(active):
 
 
 def _use(active):
-    """Play frames, and call every operator that can be used on a face."""
+    """Play frames, and call all operators of ui.face.operators that can be used now."""
     bpy.context.view_layer.update()
     for frame in (2, 3):
         bpy.context.scene.frame_set(frame)

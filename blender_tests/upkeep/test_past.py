@@ -27,8 +27,8 @@ def _same_on_every_processor():
 
 
 def folder_of(maker, tmp_path):
-    """A copy of the folder of the files that a Blender version saved. The test is skipped if the
-    running Blender is older than this version."""
+    """A copy of the folder of the files that a Blender version saved. The test is skipped if
+    the running Blender has a lower major version."""
     made_by = tuple(int(n) for n in maker.split("."))
     if made_by[0] > bpy.app.version[0]:
         pytest.skip(
@@ -47,7 +47,10 @@ def assert_same(found, wanted, where):
 
 
 def assert_same_in_direct_mode(where):
-    """Compare the vertices of all frames in Direct and in Live mode; Live mode remains set."""
+    """Compare the vertices of all frames in Automatic and in Live mode; Live mode remains set.
+
+    Checks also which faces Automatic puts into Direct mode.
+    """
     name, route, _play = where.split("/")
     may_be = name not in ORDINARY and route not in ("link", "override")
     films = {}

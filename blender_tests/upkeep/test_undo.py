@@ -17,7 +17,7 @@ def _rigs():
 
 
 def _state():
-    """Character -> its evaluated vertices at the current frame."""
+    """Character -> evaluated vertices of its visible meshes at the current frame."""
     bpy.context.view_layer.update()
     found = {}
     for rig in _rigs():

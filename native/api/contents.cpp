@@ -11,7 +11,8 @@ namespace risorius::api {
 
 namespace {
 
-// The LOD mapping of joints, channels, maps or meshes; null for other lists.
+// The mapping from LODs to the items of a list: joints, blend shape channels, animated maps or
+// meshes. Null for other lists.
 const dna::LodMapping* lods_of(const dna::Definition& d, risorius_list list) {
   switch (list) {
     case RISORIUS_JOINTS:
@@ -53,7 +54,8 @@ risorius_status refuse_index(const char* argument, std::uint32_t found, std::siz
   });
 }
 
-// Null, with an error set, if the mesh does not exist.
+// A mesh of a face, without content if it was not read. Null, with the last error set, if the face
+// is null or has no mesh of this index.
 const dna::Mesh* mesh_of(const risorius_face* face, std::uint32_t index) {
   if (face == nullptr) return (void)refuse("face", "a face was expected, found NULL"), nullptr;
   const std::size_t count = face->face->dna.definition.mesh_names.size();

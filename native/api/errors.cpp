@@ -51,8 +51,8 @@ risorius_status internal() noexcept {
 risorius_status remember(const core::Error& error, std::string_view file) noexcept {
   const risorius_status status = status_of(error.code);
   LastError& last = last_error();
-  // A constant error is shown first: if copying the texts below runs out of memory, the shown error
-  // must not point into half-copied texts.
+  // The last error first gets a constant text: if copying the texts of `error` below runs out of
+  // memory, the last error must not point into half-copied texts.
   last.shown = {status, core::to_string(error.code), "", "", -1, "There is no memory for words."};
   if (error.offset) last.shown.offset = static_cast<std::int64_t>(*error.offset);
   const bool copied = had_memory([&] {

@@ -10,24 +10,26 @@
 
 namespace risorius::api {
 
-/// Remembers an error for this thread. Never throws: if memory is short the texts are lost, but not
-/// the status.
+/// Stores an error as the last error of this thread, for risorius_last_error. Never throws: if
+/// memory is short the texts are lost, but not the status.
 /// In:  file  the path as the caller gave it, or ""
-/// Out: the error's status
+/// Out: the risorius_status for the error's code
 risorius_status remember(const core::Error& error, std::string_view file = {}) noexcept;
 
-/// Remembers an invalid argument.
-/// In: argument  its name
-///     message   the expected and the found value
+/// Stores an invalid argument of a call as the last error of this thread.
+/// In:  argument  name of the argument
+///      message   the expected and the found value
+/// Out: RISORIUS_BAD_ARGUMENT
 risorius_status refuse(std::string_view argument, std::string_view message) noexcept;
 
-/// Remember a lack of memory and an unexpected exception. Their texts are constants, because
-/// allocating memory could fail again.
+/// Store a lack of memory, or an unexpected exception, as the last error of this thread, and return
+/// its status. The texts of these errors are constants, because allocating memory could fail again.
 risorius_status out_of_memory() noexcept;
 risorius_status internal() noexcept;
 
-/// Runs body, which returns a status, and turns an exception or a lack of memory into a status.
-/// WebAssembly is built without exceptions: there a lack of memory ends the program.
+/// Runs body, which returns a status. An exception, such as a lack of memory, becomes a status and
+/// the last error of this thread. WebAssembly is built without exceptions: there a lack of memory
+/// ends the program.
 template <class Body>
 risorius_status guarded(const Body& body) noexcept {
 #ifdef __cpp_exceptions

@@ -79,8 +79,8 @@ compile::CompileOptions compile_options(const risorius_options& options) {
   return out;
 }
 
-// Fails if the caller asks for a LOD that the file does not have. The parser only skips such LODs,
-// as the DNA format's own filter does.
+// Fails if the caller asks for a LOD that the file does not have. The parser does not fail: it
+// ignores such LODs, as the DNA format's own filter does, if the file has one of the others.
 Status has_all_lods(const risorius_options& options, const dna::Dna& dna) {
   std::vector<std::uint16_t> asked(options.lods, options.lods + options.lod_count);
   const std::size_t found = dna.descriptor.lod_count;

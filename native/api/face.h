@@ -13,8 +13,8 @@ namespace risorius::api {
 
 struct Face {
   rig::Rig rig;
-  dna::Dna dna;                  // without behavior
-  std::vector<bool> gui_writes;  // [raw controls]: whether the GUI table has a row for it
+  dna::Dna dna;                  // without the layers that only the compilation needs
+  std::vector<bool> gui_writes;  // [raw controls] whether a GUI control drives the raw control
 };
 
 }  // namespace risorius::api

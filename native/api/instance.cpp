@@ -32,16 +32,16 @@ struct risorius_instance {
   std::vector<float> from_gui;  // raw controls from the table; scratch memory of risorius_set
   std::uint32_t lod = 0;
   rig::Workspace work;
-  rig::Pose pose;                       // settled
-  std::optional<rig::Instance> latent;  // with a pose of its own
-  // Points to the pose of the most recent evaluation: `pose` after a settled evaluation, the pose
-  // inside `latent` after a latent one. Null before the first: values are then read from `pose`.
+  rig::Pose pose;                       // of RISORIUS_SETTLED
+  std::optional<rig::Instance> latent;  // of RISORIUS_LATENT; has a pose of its own
+  // The pose inside `latent` after its first evaluation. Null before, and always with
+  // RISORIUS_SETTLED: values are then read from `pose`.
   const rig::Pose* evaluated = nullptr;
 };
 
 namespace {
 
-// The values of a list, or null if an instance has no values of it.
+// An instance's values of a list of controls, joints, shapes or maps; null for another list.
 const std::vector<float>* values_of(const risorius_instance& instance, risorius_list list) {
   const rig::Pose& pose = instance.evaluated != nullptr ? *instance.evaluated : instance.pose;
   switch (list) {

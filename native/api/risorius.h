@@ -73,7 +73,7 @@ typedef enum risorius_status {
 typedef struct risorius_error {
   risorius_status status;
   const char* code;    /* the error in one word, e.g. "truncated", "invalid_index" */
-  const char* file;    /* the given path; "" for bytes in memory */
+  const char* file;    /* the path given to risorius_open_file; "" in other errors */
   const char* field;   /* in the file, e.g. "behavior.joint_groups[3].values", or the argument */
   int64_t offset;      /* byte offset in the file; -1 if unknown */
   const char* message; /* one sentence with the expected and the found value */
@@ -112,8 +112,7 @@ typedef struct risorius_options {
   const char* const* meshes; /* names of the meshes to read, UTF-8 */
 } risorius_options;
 
-/* The joints in the neutral pose, and the units and axes of the file. If the file has no behavior,
- * joints have no values and stride is 9. */
+/* The joints in the neutral pose, and the units and axes of the file. */
 typedef struct risorius_skeleton {
   uint32_t joint_count;
   uint32_t stride;           /* numbers per joint: 9, or 10 with RISORIUS_QUATERNIONS */
@@ -158,7 +157,7 @@ typedef struct risorius_target {
 /* RISORIUS_ABI of the loaded library; a program must not use a library with another number. */
 RISORIUS_API uint32_t risorius_abi(void);
 
-/* Its version, e.g. "0.1.0". */
+/* The version of the library, e.g. "0.1.0". */
 RISORIUS_API const char* risorius_version(void);
 
 /* Error of the last failed call of this thread; never NULL. */
@@ -175,18 +174,20 @@ RISORIUS_API const risorius_error* risorius_last_error(void);
 RISORIUS_API risorius_status risorius_open_file(const char* path, const risorius_options* options,
                                                 risorius_face** face);
 
-/* The same from the bytes of a file; the bytes may be freed afterwards. */
+/* Reads and compiles a DNA file from its bytes, which may be freed afterwards. Otherwise as
+ * risorius_open_file. */
 RISORIUS_API risorius_status risorius_open_memory(const void* bytes, size_t size,
                                                   const risorius_options* options,
                                                   risorius_face** face);
 
-/* NULL has no effect. */
+/* Closes a face; its instances remain valid. NULL has no effect. */
 RISORIUS_API void risorius_close(risorius_face* face);
 
 /* Number of items in a list. 0 and an error for an unknown list. */
 RISORIUS_API uint32_t risorius_count(const risorius_face* face, risorius_list list);
 
-/* The name of an item, UTF-8, from the file. NULL and an error: no such item. */
+/* The name of an item as in the file, UTF-8. NULL and an error if the list has no such item or no
+ * names. */
 RISORIUS_API const char* risorius_name(const risorius_face* face, risorius_list list,
                                        uint32_t index);
 
@@ -199,11 +200,11 @@ RISORIUS_API risorius_status risorius_lod_items(const risorius_face* face, risor
 RISORIUS_API risorius_status risorius_get_skeleton(const risorius_face* face,
                                                    risorius_skeleton* skeleton);
 
-/* A mesh that was not read, or was filtered out, has counts of 0. */
+/* The arrays of a mesh. A mesh that was not read, because of the options, has counts of 0. */
 RISORIUS_API risorius_status risorius_get_mesh(const risorius_face* face, uint32_t mesh,
                                                risorius_mesh* out);
 
-/* In: target  below the mesh's target_count */
+/* One target of a mesh. In: target  below the mesh's target_count */
 RISORIUS_API risorius_status risorius_get_target(const risorius_face* face, uint32_t mesh,
                                                  uint32_t target, risorius_target* out);
 
@@ -220,7 +221,7 @@ typedef uint32_t risorius_timing;
 RISORIUS_API risorius_status risorius_create(const risorius_face* face, risorius_timing timing,
                                              risorius_instance** instance);
 
-/* NULL has no effect. */
+/* Destroys an instance. NULL has no effect. */
 RISORIUS_API void risorius_destroy(risorius_instance* instance);
 
 /* Sets controls `first` to `first + count - 1` of RISORIUS_RAW_CONTROLS or RISORIUS_GUI_CONTROLS.
@@ -233,14 +234,20 @@ RISORIUS_API risorius_status risorius_set(risorius_instance* instance, risorius_
 /* Sets the LOD of later evaluations. */
 RISORIUS_API risorius_status risorius_set_lod(risorius_instance* instance, uint32_t lod);
 
-/* Computes the pose of the controls. */
+/* Computes the pose of the present controls at the present LOD, for risorius_values. */
 RISORIUS_API risorius_status risorius_evaluate(risorius_instance* instance);
 
-/* Values of an instance: controls as set, all others from the last evaluation. Joints are deltas
- * added to neutral, float[joints, stride] (quaternions: multiplied with neutral); a scale of 0
- * means no scaling. Items that the LOD does not use are 0. In:  list   RISORIUS_RAW_CONTROLS to
- * RISORIUS_MAPS Out: count  number of floats; may be NULL Returns NULL and an error: unknown list.
- * An empty list is no error; do not read the pointer. */
+/* Values of an instance: controls as set, all others from the last evaluation, or 0 before the
+ * first one. Joints are deltas added to neutral, float[joints, stride] (quaternions: multiplied
+ * with neutral); a scale of 0 means no scaling. Items that the LOD does not use are 0
+ * (quaternions: 0 0 0 1).
+ *
+ * In:  list   RISORIUS_RAW_CONTROLS to RISORIUS_MAPS
+ *
+ * Out: count  number of floats; may be NULL
+ *
+ * The result is NULL, with an error, if the instance is NULL or the list is another one. An empty
+ * list is no error, but its pointer must not be read. */
 RISORIUS_API const float* risorius_values(const risorius_instance* instance, risorius_list list,
                                           uint32_t* count);
 

@@ -36,19 +36,22 @@ struct SkinPose {
   std::vector<std::vector<Vector3>> solids;  // [solids][vertices]
 };
 
-/// The faults of a pose. To merge the faults of two poses, take the worse value of each entry.
+/// The faults of a pose. To merge the faults of two poses, take the larger depth and stretch and
+/// the smaller fold of each entry.
 struct SkinFaults {
-  std::vector<float> depth;    // [V] mm inside a solid or the skin itself; 0: outside
+  // [V] mm inside a solid or the skin itself; 0: outside, not shown, or deeper than 6 mm in a solid
+  // or 4 mm in the skin.
+  std::vector<float> depth;
   std::vector<float> stretch;  // [F] area divided by the neutral area
-  std::vector<float> fold;     // [inner edges] cosine between the normals of the two faces
+  std::vector<float> fold;     // [edges of two faces] cosine between the normals of the two faces
 };
 
-/// The faults beyond the allowed ones, one sum for each kind.
+/// Sizes and numbers of the faults that are worse than the allowed faults.
 struct FaultSums {
-  double volume = 0.0;        // mm3: depth times area
-  double deepest = 0.0;       // mm beyond the allowed depth
+  double volume = 0.0;        // mm3: sum of depth beyond the allowed depth times the vertex's area
+  double deepest = 0.0;       // mm, the largest depth beyond the allowed depth
   std::size_t stretched = 0;  // faces of more than kStretch times their neutral area
-  double widest = 0.0;        // area divided by the neutral area, of the most stretched face
+  double widest = 0.0;        // area divided by the neutral area, of the most stretched of them
   std::size_t folded = 0;     // edges whose two faces lie on each other
 };
 
@@ -65,7 +68,8 @@ class SkinChecker {
   static constexpr double kAround = 10.0;  // mm around a fault in which vertices may move
 
   /// Checks a skin and prepares it for the search for faults.
-  /// Fails: kInvalidIndex (a corner), kInvalidLength (offsets), kInvalidValue (not finite)
+  /// Fails: kInvalidIndex (a vertex of a corner or of a solid's triangle), kInvalidLength (offsets,
+  ///        no face), kInvalidValue (`neutral` or `mm`)
   static core::Result<SkinChecker> make(Skin skin);
   ~SkinChecker();
   SkinChecker(SkinChecker&&) noexcept;
@@ -79,8 +83,9 @@ class SkinChecker {
   };
   /// The nearest points of the neutral skin.
   /// In: points   in the skin's unit
-  ///     normals  of the points: only triangles with a similar normal are searched, so that the
-  ///              upper lip is not mistaken for the lower one; empty: all triangles are searched
+  ///     normals  of the points: only triangles with a similar normal (cosine above 0.3) are
+  ///              searched, so that the upper lip is not mistaken for the lower one; all triangles
+  ///              are searched if none has a similar normal, or if `normals` is empty
   /// Fails: kInvalidValue (not finite), kInvalidLength (normals)
   core::Result<std::vector<Place>> nearest(const std::vector<Vector3>& points,
                                            const std::vector<Vector3>& normals = {}) const;
@@ -91,17 +96,18 @@ class SkinChecker {
   core::Result<SkinFaults> look(const SkinPose& pose) const;
   /// Sums the faults beyond the allowed ones.
   /// In: allowed  faults of the same skin; an entry of `faults` that is no worse than the allowed
-  ///              entry does not count
+  ///              entry, or a depth that is at most kDepth worse, does not count
   /// Fails: kInvalidLength (faults of another skin)
   core::Result<FaultSums> sum(const SkinFaults& faults, const SkinFaults& allowed) const;
   /// A displacement of the vertices that removes all faults beyond `allowed`, or as many as
   /// possible. No sum of faults becomes worse. The deepest vertex becomes at most 0.1 mm deeper and
   /// the most stretched face at most 1 % wider, allowed faults included.
   ///
-  /// Only vertices within kAround of a fault move. There the motion of single parts of the pose is
-  /// taken back, beginning with the parts that move the vertices least. A least squares solve
-  /// removes the remaining faults. Vertices without a fault keep nine tenths of their motion,
-  /// unless that would cause a fault.
+  /// Only vertices within kAround of a fault move. There the motion of parts of the pose is taken
+  /// back: of a mix that prefers the parts that move a vertex least, of each part alone, and of the
+  /// mean of all parts; the way that changes the pose least is kept. A least squares solve removes
+  /// the remaining faults. Vertices without a fault keep nine tenths of their motion, unless that
+  /// would cause a fault.
   /// In: without  [parts][V] the positions of the skin without each part of the pose, such as one
   ///              of its expressions
   /// Fails: as look

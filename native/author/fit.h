@@ -51,8 +51,9 @@ struct FitOptions {
   bool symmetric = true;       // mirrored joints and weights, if the mesh is symmetric
   /// A higher value makes the largest error smaller and the mean error larger; 0: least squares.
   double emphasis = 3.0;
-  /// A joint takes no part in an expression in which it moves every vertex by less than this, in
-  /// the shapes' unit; the other joints take over. 0: all joints take part in all expressions.
+  /// A joint that is not given takes no part in an expression in which it moves every vertex by
+  /// less than this, in the shapes' unit; the other joints take over. 0: all joints take part in
+  /// all expressions.
   double least_effect = 0.0;
   /// The result is the round whose largest error is the smallest. false: only the last four rounds
   /// are compared; true: the whole second half of the rounds is compared.
@@ -76,13 +77,16 @@ struct Fit {
 using Progress = std::function<bool(double)>;
 
 /// Finds joints, weights and motions for shapes.
-/// Fails: kInvalidArgument (options, sizes; "stopped" if progress returned false),
-///        kInvalidValue (a value that is not finite, shapes without any motion)
+/// Fails: kInvalidArgument (options, the number of displacements; "stopped" if progress returned
+///        false), kInvalidLength (importance, motions of a given joint), kInvalidIndex (an edge, a
+///        pivot's expression, a given joint's mirror), kInvalidValue (a value that is not finite,
+///        shapes without any motion)
 /// Cost: grows with vertices x influences x expressions, and with joints
 core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
                              const Progress& progress = {});
 
-/// Initial weights: rows as in Fit. The weights of a vertex may have any sum above 0.
+/// Initial weights: rows as in Fit. They are divided by the sum of their vertex. A vertex whose
+/// weights are all 0 follows the first joint without motion.
 struct StartWeights {
   std::size_t influences = 0;
   std::vector<std::uint16_t> joints;  // [V][influences]
@@ -92,7 +96,8 @@ struct StartWeights {
 /// Motions of new joints whose weights are known: transfers the rig of one face to another face of
 /// the same topology.
 /// In: shapes   of the other face
-///     options  joints (total), given, pivots, emphasis, least_effect and threads are used
+///     options  joints (total), given (one of them without motions), pivots, emphasis,
+///              least_effect and threads are used
 ///     weights  of all joints, the given ones first, as in a Fit
 ///     at       [new joints] index of the pivot at which a joint is placed; kInTheMiddle: it is
 ///              placed in the middle of its vertices
@@ -104,10 +109,10 @@ inline constexpr std::uint32_t kInTheMiddle = 0xffffffffu;
 
 /// Weights of another mesh, such as a coarser level of detail, on joints with given motions.
 /// In: joints   with their motions in each expression of the shapes
-///     options  influences, smoothness, threads
+///     options  influences, smoothness, symmetric and threads are used
 ///     start    initial weights, such as the finer mesh's; empty: all weight is on a joint that
 ///              does not move
-/// Out: a Fit with the given joints alone
+/// Out: a Fit with these joints; if all of them move, a joint without motion follows them
 /// Fails: as fit_joints; kInvalidLength, kInvalidIndex, kInvalidValue (start)
 core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint>& joints,
                               const FitOptions& options, const StartWeights& start = {});

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Finds the vertex and the expression on the other side of a symmetric face.
 #include "author/mirror.h"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Packs and unpacks the buffers of glTF's EXT_meshopt_compression with meshoptimizer.
 #include "author/packed.h"
 
 #include <meshoptimizer/meshoptimizer.h>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Reduces the triangles of a mesh with meshoptimizer, then mends slivers: triangles that are
+// almost lines.
 #include "author/simplify.h"
 
 #include <meshoptimizer/meshoptimizer.h>
@@ -57,8 +59,8 @@ constexpr int kPasses = 8;
 // equilateral triangle has 0.43.
 constexpr double kSliver = 0.06;
 constexpr double kBetter = 1.5;     // factor by which the worse of two triangles has to improve
-constexpr double kAsOneFace = 0.8;  // cosine between a triangle's normal and the common one
-constexpr double kGap = 0.04;  // least distance between the diagonals, divided by the shorter one
+constexpr double kAsOneFace = 0.8;  // least cosine between the new normals and the old mean
+constexpr double kGap = 0.04;  // largest distance of the old from the new edge / the shorter edge
 
 Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Point cross(const Point& a, const Point& b) {

@@ -20,8 +20,8 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Indices = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 
-/// Makes Shapes from arrays [V, 3], [E, V, 3] and [edges, 2]. Raises ValueError if their shapes do
-/// not agree.
+/// Makes Shapes from neutral [V, 3], displacements [E, V, 3], edges [n, 2] and importance [V] or
+/// empty. Raises ValueError if the shapes of the first three do not agree.
 author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const Indices& edges,
                       const Doubles& importance) {
   if (neutral.ndim() != 2 || neutral.shape(1) != 3) shape_error("neutral", "(V, 3)", neutral);
@@ -117,7 +117,8 @@ author::StartWeights start_weights(const Indices& joints, const Floats& weights)
   return out;
 }
 
-/// Adds the given joints to the options. Raises ValueError if their motions have another number of
+/// The options with the given joints; their number is added to options.joints, which from Python
+/// counts only new joints. Raises ValueError if a given joint's motions have another number of
 /// expressions than the shapes.
 author::FitOptions with_given(author::FitOptions options, const author::Shapes& shapes,
                               const GivenJoints& given) {
@@ -287,7 +288,8 @@ void bind_fits(py::module_& m) {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The value that belongs to a name. Raises ValueError if the name is unknown.
+/// The enumerator that a name such as "TRIANGLES" stands for. Raises ValueError for a name that is
+/// not in `known`. In: what  name of the argument, for the error
 template <class T, std::size_t kCount>
 T named(const char* what, const std::string& name,
         const std::array<std::pair<const char*, T>, kCount>& known) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Binds .rzc clip files: encoding, reading in parts, and recording.
 #include <mutex>
 #include <numeric>
 
@@ -137,7 +138,7 @@ class ClipFile {
   std::mutex mutex_;
 };
 
-// A writer for Python. A mutex lets one thread append frames at a time.
+// A writer of a clip file for Python. A mutex lets only one thread use it at a time.
 class ClipFileWriter {
   template <class What>
   auto locked(What&& what) {

@@ -17,7 +17,8 @@ namespace {
   throw py::error_already_set();
 }
 
-// Replaces a file atomically as write_file_atomically does, except that Python writes the content.
+// A new hidden file in the folder of `path`, into which Python writes. commit() flushes it to disk
+// and replaces `path` with it; discard() removes it.
 class FileReplacement {
  public:
   FileReplacement(const std::filesystem::path& path, bool sweep) : path_(path) {

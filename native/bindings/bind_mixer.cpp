@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Binds the mixer, which combines layers of curves and reactions to the controls of a frame.
 #include "bindings/numpy_arrays.h"
 #include "clip/mixer/mixer.h"
 
@@ -18,8 +19,8 @@ using PartTuple = std::tuple<IndexArray, FloatArray, double, double, double, dou
 // Arguments of the mixer's rule Yield: by, of, measure, amount.
 using YieldTuple = std::tuple<IndexArray, IndexArray, std::string, float>;
 
-// Returns the value, or raises the error as a ValueError: no file is involved that a more specific
-// error could name.
+// Returns the value of a result, or raises its error as a ValueError: no file is involved that a
+// more specific error could name.
 template <class T>
 T value_or_throw(core::Result<T>&& result) {
   if (!result) throw py::value_error(result.error().describe());

@@ -33,7 +33,7 @@ std::vector<registering::Triangle> corners(const Integers& values) {
   std::vector<registering::Triangle> out(static_cast<std::size_t>(values.shape(0)));
   for (std::size_t i = 0; i < out.size(); ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
-      // A negative index becomes larger than any vertex index, and ClosestPoints::make rejects it.
+      // A negative index becomes larger than any vertex index, so that later checks reject it.
       out[i][k] = static_cast<std::uint32_t>(values.data()[3 * i + k]);
     }
   }

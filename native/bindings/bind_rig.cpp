@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Binds Rig, a compiled face, and its evaluation from raw controls to poses.
 #include <algorithm>
 #include <list>
 
@@ -95,8 +96,8 @@ std::shared_ptr<const void> keep(const py::buffer& buffer, const void* address) 
 }
 
 // A bytes object is immutable and can be used in place. Any other buffer is copied, even a
-// read-only view, because its owner may still write to it. Bytes that are not aligned to 64 are
-// copied too.
+// read-only view, because its owner may still write to it. Bytes whose address is not a multiple of
+// 64 are copied too.
 std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
                                          const std::optional<std::string>& simd) {
   const py::buffer_info info = buffer.request();
@@ -217,7 +218,7 @@ PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lo
   const rig::PoseView pose = view_of(out);
   if (settle) {
     rig::evaluate(rig, in.data(), lod, true, workspace_of(rig), pose);
-  } else {  // needs a new workspace, because a kept one has the controls of an earlier frame
+  } else {  // a new workspace, so that no value of an earlier frame takes part
     rig::Workspace work = rig::make_workspace(rig);
     rig::evaluate(rig, in.data(), lod, false, work, pose);
   }

@@ -141,7 +141,8 @@ std::string word(const std::array<const char*, kCount>& words, std::uint32_t val
   return value < kCount ? words[value] : "#" + std::to_string(value);
 }
 
-/// The number for a word. In: name  of the field. Raises ValueError for an unknown word.
+/// The number for a word; 17 for "#17". In: name  of the field. Raises ValueError for an unknown
+/// word.
 template <class Number, std::size_t kCount>
 Number value_of_word(const std::array<const char*, kCount>& words, const std::string& text,
                      const char* name) {

@@ -20,13 +20,14 @@ namespace py = pybind11;
 
 /// Raises an error as a Python exception.
 /// In: file  the file that the error is about, or ""
-///     type  the exception class; nullptr: the class that belongs to the error's code
+///     type  the exception class; nullptr: risorius.DnaError
 void throw_error(const core::Error& error, const std::string& file = "", PyObject* type = nullptr);
 /// Makes an error class derived from risorius.base.errors.RisoriusError. The caller must never
 /// release it.
 PyObject* new_error_type(const char* name, const char* doc);
 
-/// Returns the value of a result, or raises its error. In: file  as in throw_error
+/// Returns the value of a result, or raises its error as a risorius.DnaError. In: file  the file
+/// that the error is about, or ""
 template <class T>
 T unwrap(core::Result<T>&& result, const std::string& file = "") {
   if (!result) throw_error(result.error(), file);
@@ -82,7 +83,8 @@ py::array to_numpy(const core::PlanarArray<kPlanes>& array) {
 
 using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
-/// Converts a list of numbers to float32. Raises ValueError for other objects or another length.
+/// Converts numbers to a float32 array of shape (length,). Raises ValueError for other objects or
+/// shapes.
 inline FloatArray vector_argument(const py::object& object, const char* name, std::size_t length) {
   FloatArray array = FloatArray::ensure(object);
   if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
@@ -121,8 +123,9 @@ inline py::array_t<float> written_argument(const py::object& object, const char*
   return out;
 }
 
-/// Copies a sequence of numbers to a core array. In: name  of the argument, for errors. Raises
-/// ValueError for other objects, or for integers that do not fit T.
+/// Copies a one-dimensional sequence of numbers to a core array. In: name  of the argument, for
+/// errors. Raises ValueError for other objects, and, if T is an integer type, for numbers that are
+/// not integers or do not fit T.
 template <class T>
 core::Array<T> from_python(const py::object& object, const char* name) {
   const py::module_ numpy = py::module_::import("numpy");
@@ -147,7 +150,8 @@ core::Array<T> from_python(const py::object& object, const char* name) {
   return core::Array<T>(std::vector<T>(typed.data(), typed.data() + typed.size()));
 }
 
-/// Copies float[n, planes] to planes. Raises ValueError for other objects or shapes.
+/// Copies float[n, kPlanes] to planes: all x, then all y, and so on. An array of any shape without
+/// numbers gives no vectors. Raises ValueError for other objects or shapes.
 template <std::size_t kPlanes>
 core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const char* name) {
   auto typed = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(object);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A checked big-endian reader over a Source. Every error of a parser is made here or passes through
-// fail() here, so that it has an offset and a field.
+// A checked big-endian reader over a Source. Every error of a parser that reads bytes is made here
+// or passes through fail_at() here, so that it has an offset and a field.
 #pragma once
 
 #include <bit>
@@ -19,16 +19,17 @@ namespace risorius::bytes {
 
 /// Reads numbers one after the other. After the first failure every read returns zero or an empty
 /// list and error() keeps that failure, so that a parser checks once per struct and not once per
-/// number. A file is read through a window that never reaches beyond end() and begins small after a
-/// jump, so that skipped bytes are not read. Memory is read in place and copied only into the
-/// lists.
+/// number. A file is read through a window that never reads beyond end() and begins small after a
+/// jump, so that skipped bytes are not read. A source in memory is read in place; bytes are copied
+/// only into the returned lists and texts.
 class ByteReader {
  public:
   /// In: source   must outlive the reader
-  ///     kernels  swap the bytes of lists; by default RISORIUS_SIMD or the CPU decides
+  ///     kernels  functions that swap the bytes of lists; by default the best ones for the CPU, or
+  ///              the ones that the environment variable RISORIUS_SIMD names
   explicit ByteReader(Source& source, const simd::Kernels& kernels = simd::usual_kernels());
 
-  /// The name of the kernels, as in Rig.simd.
+  /// The name of the kernels: "scalar", "sse4", "avx2", "avx512" or "neon".
   const char* simd() const { return kernels_->name; }
 
   ByteReader(const ByteReader&) = delete;
@@ -44,24 +45,28 @@ class ByteReader {
   core::Unexpected take_error() { return core::Unexpected{*error_}; }
   /// Clears the error, so that enter() can continue elsewhere.
   void clear_error();
-  /// Sets the largest accepted number of elements of a list, even if more bytes are left.
+  /// Sets the largest count that count() accepts for a list or a text, even if more bytes are left.
   void set_max_count(std::uint32_t n) { max_count_ = n; }
   /// Remembers an error, unless there is one already. The error's field is where().
-  /// In: offset  the wrong byte in the file
+  /// In: offset  offset of the wrong byte in the source
   void fail_at(std::uint64_t offset, core::ErrorCode code, std::string message);
 
-  /// Restricts reading to [offset, offset + size). Out: false, with an error set, if the range lies
-  /// outside of the source.
+  /// Moves the position to offset and restricts reading to [offset, offset + size). Out: false,
+  /// without a move, if there was a failure before, or if a part of the range lies outside of the
+  /// source, which is an error (kTruncated).
   bool enter(std::uint64_t offset, std::uint64_t size);
-  /// Makes the window small again, as after a jump: call it if little of the following bytes is
-  /// needed.
+  /// Makes the next read of the file small (512 bytes, or more if a call needs more), as after a
+  /// jump: call it if few of the following bytes are needed.
   void read_small() { next_read_ = 0; }
 
   std::uint8_t u8() { return number<std::uint8_t>(); }
   std::uint16_t u16() { return number<std::uint16_t>(); }
   std::uint32_t u32() { return number<std::uint32_t>(); }
   float f32() { return std::bit_cast<float>(u32()); }
-  /// Reads the count of a list. It fails unless count * element_size bytes are left.
+  /// Reads the count of a list, a u32. It fails unless count * element_size bytes are left after it
+  /// and the count is at most the number of set_max_count().
+  /// In:  element_size  smallest size of an element in the file, bytes
+  /// Out: the count, 0 after a failure
   std::uint32_t count(std::uint32_t element_size) {
     if (ready_ - at_ >= 4) {
       const std::uint32_t n = load<std::uint32_t>(at_);
@@ -72,10 +77,11 @@ class ByteReader {
     }
     return count_slowly(element_size);
   }
-  /// The number at offset, if it lies between the present position and end(). Does not move the
-  /// position.
+  /// The number at offset, without moving the position. Nullopt if its two bytes do not lie between
+  /// the present position and end(), if they cannot be read, or after a failure.
   std::optional<std::uint16_t> peek_u16(std::uint64_t offset);
-  /// Reads a count, then that number of bytes of text.
+  /// Reads a count, then that number of bytes of text. If the file became shorter while it was
+  /// read, this call fails, and the rest of the text is zeros.
   std::string str();
   std::vector<std::uint8_t> bytes(std::uint64_t size);
   void skip(std::uint64_t size);
@@ -86,8 +92,9 @@ class ByteReader {
   /// Reads a count, then that number of values.
   /// Out: largest      raised to the largest value
   core::Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
-  /// Reads n values without a count, straight into out. In: n already checked by count(). After a
-  /// failure the content of out is undefined.
+  /// Reads n values without a count, straight into out, and sets all_finite as f32_list does. After
+  /// a failure the content of out is undefined.
+  /// In: n  checked with count() before, so that out has room for n values
   void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
   /// Read n integers without a count, as read_f32 does. `largest` of read_u32 is raised as in
   /// u32_list.
@@ -120,8 +127,8 @@ class ByteReader {
     return v;
   }
   std::uint32_t count_slowly(std::uint32_t element_size);
-  /// Calls take(at, n) for runs of n values at address `at` until all values are taken. A run ends
-  /// where the loaded bytes end.
+  /// Reads n values of kSize bytes: calls take(address, count) for consecutive runs of values until
+  /// n values are taken. A run ends where the loaded bytes end. Out: false after a failure
   template <std::size_t kSize, class Take>
   bool for_runs(std::size_t n, const Take& take);
   bool check_left(std::uint64_t bytes);
@@ -134,10 +141,10 @@ class ByteReader {
   Source* source_;
   std::uint64_t end_ = 0;
   std::uint32_t max_count_ = 0xFFFFFFFF;
-  // [first_, loaded_) are the loaded bytes, from offset window_begin_ of the source on: the
-  // window's, or all bytes of a source in memory. [at_, ready_) are the bytes that can be read
-  // without a further check: they lie inside the region of enter(), and there are none after a
-  // failure.
+  // [first_, loaded_) are the loaded bytes, from offset window_begin_ of the source on: bytes of
+  // the window, or all bytes of a source in memory. [at_, ready_) are the bytes that can be read
+  // without a further check: they are loaded and inside the region of enter(); after a failure this
+  // range is empty.
   std::uint64_t window_begin_ = 0;
   const std::uint8_t* first_ = nullptr;
   const std::uint8_t* at_ = nullptr;
@@ -149,8 +156,8 @@ class ByteReader {
   std::optional<core::Error> error_;
 };
 
-/// Names the field that is being read, while this object exists: Field f(reader, "joint_groups",
-/// i);
+/// Appends a name, and an index unless it is -1, to the reader's where() while this object exists:
+/// Field f(reader, "joint_groups", i);
 class Field {
  public:
   Field(ByteReader& reader, const char* name, std::int64_t index = -1) : reader_(reader) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reads a whole file into memory, and tells whether it is the user's own.
+// Reads a whole file into memory, and tells whether only the user of this process can write it.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 namespace risorius::bytes {
 
 struct FileBytes {
-  std::span<const std::uint8_t> bytes;  // aligned to 64
+  std::span<const std::uint8_t> bytes;  // begin on a multiple of 64 bytes
   std::shared_ptr<const void> owner;    // keeps the bytes alive
-  /// The user of this process owns the file and nobody else may write to it. Checked on the open
-  /// file, not on its name. Always false on systems without access modes (Windows).
+  /// The user of this process owns the file, and its access mode lets nobody else write to it.
+  /// Checked on the open file, not on its name. Always false on Windows, which has no such modes.
   bool is_own = false;
 };
 
@@ -23,13 +23,14 @@ enum class ReadBy {
   kCopy,
   /// Maps the pages of the file, which costs nothing until they are used. If the file is cut short,
   /// the process crashes; if the file is written to, the bytes change. So use kMap only for files
-  /// that are replaced as a whole (write_file_atomically). Systems without maps make a copy.
+  /// that are replaced as a whole (write_file_atomically). The file is copied if it is empty, or if
+  /// the system has no maps or refuses one.
   kMap,
 };
 
 /// Reads a whole file.
-/// Fails: kIoOpen, kIoRead (the system's reason; not a plain file; a file that becomes shorter
-///        while it is read)
+/// Fails: kIoOpen (the system's reason; a folder or another file that is not plain), kIoRead (the
+///        system's reason; a file that becomes shorter while it is read)
 core::Result<FileBytes> read_file(const std::filesystem::path& path, ReadBy by = ReadBy::kCopy);
 
 }  // namespace risorius::bytes

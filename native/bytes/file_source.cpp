@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// A file as a source of bytes: the file stays open, and each read states its offset. A Handle is a
+// file descriptor, on Windows a C stream.
 #include <cerrno>
 #include <cstdio>
 #include <system_error>
@@ -44,7 +46,7 @@ Handle open_for_reading(const std::filesystem::path& path) {
     number < 0 ? static_cast<void>(CloseHandle(handle)) : static_cast<void>(_close(number));
     return nullptr;
   }
-  // The reader has a window of its own; a second buffer would only add a copy.
+  // ByteReader has a window of its own; a second buffer would only add a copy.
   std::setvbuf(file, nullptr, _IONBF, 0);
   return file;
 }

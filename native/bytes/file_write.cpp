@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Writes a new file under a hidden name in the folder of its target, flushes it to disk and renames
+// it to the target, so that the target is complete at any time. The hidden name contains the
+// machine and the process that made the file, so that leftovers of ended processes can be removed.
 #include "bytes/file_write.h"
 
 #include <algorithm>
@@ -195,7 +198,8 @@ std::string hidden_name() {
   return name_begin() + std::to_string(process_number()) + "-" + token + std::string(kEnd);
 }
 
-// The number of the process that made a file with this hidden name; empty for other names.
+// The number of the process that made a file with this hidden name. Nullopt for other names and for
+// names of other machines. In: begin  result of name_begin()
 std::optional<long long> maker_of(std::string_view name, std::string_view begin) {
   constexpr std::size_t kTail = 1 + kTokenDigits + kEnd.size();
   if (!name.starts_with(begin) || !name.ends_with(kEnd)) return {};

@@ -16,10 +16,11 @@ namespace risorius::bytes {
 
 /// The system calls of a file writer. Tests replace them with failing calls, because a power cut
 /// and most kinds of full disks cannot be produced otherwise. A call that fails returns a negative
-/// number and sets errno.
+/// number and sets errno. A call that succeeds returns 0, except that `create` returns a descriptor
+/// and `write` the number of bytes that it has written.
 struct FileCalls {
-  /// The descriptor of a new file. If `is_private`, only its owner may read it; otherwise the
-  /// system's default for new files applies.
+  /// Makes a file, which must not exist. If `is_private`, only its owner may read it; otherwise,
+  /// and always on Windows, the system's default for new files applies.
   int (*create)(const std::filesystem::path& path, bool is_private);
   std::ptrdiff_t (*write)(int file, const std::uint8_t* bytes, std::size_t count);
   int (*sync)(int file);
@@ -32,22 +33,25 @@ const FileCalls& system_file_calls();
 /// A new file that gets its final name when it is complete.
 class NewFile {
  public:
-  /// Whether a file that never got its final name is removed or kept.
+  /// Whether the destructor removes or keeps a file that never got its final name.
   enum class Leftover { kRemove, kKeep };
 
-  /// Makes an empty file.
-  /// Fails: the system's reason in `error`; std::errc::file_exists if the name is taken.
+  /// Makes an empty file. Out: nullopt if it fails, with the system's reason in `error`:
+  /// std::errc::file_exists if the name is taken.
   static std::optional<NewFile> create(const std::filesystem::path& path, Leftover leftover,
                                        std::error_code& error,
                                        const FileCalls& calls = system_file_calls());
   /// Makes a file in the folder of `target` under a hidden name, whose length does not depend on
-  /// the name of `target`. If `target` exists, only the owner can read the new file until it has
-  /// the rights of `target`. Fails: as create; is_a_directory if `target` is a folder.
+  /// the name of `target`. If `target` exists, only the owner can read the new file until
+  /// take_place_of gives it the rights of `target` (not on Windows). The destructor removes a file
+  /// that never took the place of another. Out: nullopt if it fails, with the reason in `error`:
+  /// the system's; is_a_directory if `target` is a folder; not_a_directory if its folder is a file.
   static std::optional<NewFile> beside(const std::filesystem::path& target, std::error_code& error,
                                        const FileCalls& calls = system_file_calls());
 
-  /// Opens a file that another writer has made on the file system of its final place. It keeps its
-  /// name until take_place_of. Fails: the system's reason.
+  /// Opens a complete file that another writer has made on the file system of its final place. It
+  /// keeps its name until take_place_of, and the destructor does not remove it. Out: nullopt if it
+  /// fails, with the system's reason in `error`.
   static std::optional<NewFile> adopt(const std::filesystem::path& path, std::error_code& error,
                                       const FileCalls& calls = system_file_calls());
 
@@ -56,11 +60,14 @@ class NewFile {
   ~NewFile();
 
   const std::filesystem::path& path() const { return path_; }
-  /// Appends bytes. Fails: the system's reason; some of the bytes may have been written.
+  /// Writes bytes after all bytes that this object wrote before; the first call writes from the
+  /// beginning of the file. Out: the system's reason if it fails; some of the bytes may then have
+  /// been written.
   std::error_code write(std::span<const std::uint8_t> bytes);
-  /// Flushes the file to disk, closes it, gives it the rights of an old `target` and replaces
-  /// `target` with it. Other descriptors of the file must be closed before. Call it only once.
-  /// Fails: the system's reason; `target` is unchanged.
+  /// Flushes the file to disk, closes it, gives it the rights of an old `target` if the system
+  /// allows it (not on Windows), and replaces `target` with it. Other descriptors of the file must
+  /// be closed before. Call it only once. Out: the system's reason if it fails; `target` is then
+  /// unchanged.
   std::error_code take_place_of(const std::filesystem::path& target);
 
  private:
@@ -77,16 +84,20 @@ class NewFile {
   int file_;  // -1: closed
 };
 
-/// The file that `path` refers to: `path` itself, or the target of a link, which need not exist.
+/// The file that `path` refers to: `path` itself, or, if it is a symbolic link, the end of the
+/// chain of links (40 at most), which need not exist. `path` itself if a link cannot be read.
 std::filesystem::path linked_file(const std::filesystem::path& path);
 
-/// Makes a hidden folder in the folder of `target`, named as in NewFile::beside, for several files
-/// that are not in their final places yet. Fails: as NewFile::beside, with an empty path.
+/// Makes a hidden folder in the folder of `target`, named like the files of NewFile::beside, for
+/// several files that are not in their final places yet. Out: the folder's path; empty if the call
+/// fails, with the reason in `error`: the system's; is_a_directory if `target` is a folder;
+/// not_a_directory if its folder is a file.
 std::filesystem::path make_hidden_folder(const std::filesystem::path& target,
                                          std::error_code& error);
 
-/// Removes files and folders, named as in NewFile::beside, that ended processes of this machine
-/// left in a folder. Leftovers that cannot be read or removed are skipped without an error.
+/// Removes the hidden files and folders that NewFile::beside and make_hidden_folder made in
+/// `folder` for processes of this machine that have ended. Leftovers that cannot be read or removed
+/// are skipped without an error.
 void remove_leftovers(const std::filesystem::path& folder);
 
 /// The reason why a file could not be written, in the system's words or in clearer ones.

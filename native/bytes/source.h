@@ -15,7 +15,8 @@ class Source {
  public:
   virtual ~Source() = default;
   virtual std::uint64_t size() const = 0;
-  /// Reads up to out.size() bytes at offset. Out: the number of bytes read; smaller only at the end
+  /// Reads up to out.size() bytes at offset. Out: the number of bytes read; it is smaller at the
+  /// end of the source and if the file cannot be read.
   virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) = 0;
   /// All bytes, if they are in memory for the lifetime of the source; otherwise empty.
   virtual std::span<const std::uint8_t> view() const { return {}; }
@@ -34,7 +35,7 @@ class SpanSource final : public Source {
 };
 
 /// Opens a file for reading. It is not mapped, because a mapped file that is cut short would crash
-/// the process. Fails: kIoOpen with the system's reason.
+/// the process. Fails: kIoOpen (a folder; the system's reason), kIoRead (the size is not known).
 core::Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path);
 
 }  // namespace risorius::bytes

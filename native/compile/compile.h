@@ -19,7 +19,7 @@ enum class Rotation { kEuler, kQuaternion };
 enum class Precision { kFloat32, kFloat16 };
 
 struct CompileOptions {
-  const simd::Kernels* kernels = nullptr;     // nullptr: the best that this CPU supports
+  const simd::Kernels* kernels = nullptr;     // nullptr: as simd::find_kernels(nullptr)
   Precision precision = Precision::kFloat32;  // of the joint matrices
   Rotation rotation = Rotation::kEuler;       // form of the rotations in a pose
   core::Budget* budget = nullptr;             // nullptr: budget_for(dna)
@@ -33,7 +33,9 @@ core::Budget budget_for(const dna::Dna& dna);
 /// Compiles the behavior of a face. The result does not refer to the Dna.
 /// Fails: kInvalidIndex, kInvalidLength, kInvalidValue with the field, because a Dna may have been
 ///        edited; kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded (more
-///        controls than 16-bit indices reach, the budget)
+///        controls or joint attributes than 16-bit indices reach, more values than 32-bit indices
+///        reach, the budget); kInvalidArgument if RISORIUS_SIMD has an unknown name or names
+///        kernels that this CPU lacks
 /// From:  dna-format 12; joint matrices are stored by columns, so that inactive columns cost
 ///        nothing
 core::Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options = {});

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Compiles the joint groups, the matrices from controls (columns) to joint attributes (rows). The
+// file stores them by rows, the Rig stores the columns with a value other than 0, sorted by
+// control. Joint attributes are divided into blocks of 16, which take their values from rows.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -128,8 +131,8 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   return ok();
 }
 
-// The first row in which each column has a value other than 0. At a LOD with no more rows than this
-// the column has no effect.
+// The first row in which each column has a value other than 0, `rows` if there is none. At a LOD
+// with no more rows than this the column has no effect.
 std::vector<std::uint32_t> first_rows_with_values(const dna::JointGroup& g, std::uint32_t rows) {
   const std::size_t columns = g.input_indices.size();
   std::vector<std::uint32_t> first(columns, rows), missing(columns);
@@ -217,8 +220,8 @@ void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
   }
 }
 
-// Assigns each column its offset in the rig's block of joint values. The columns are sorted by
-// control, and those of one control by group.
+// Assigns each column its offset in the rig's joint_values. The columns are sorted by control, and
+// the columns of one control by group.
 Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entries, RigData& out,
                      KeptMatrices& kept) {
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -293,7 +296,9 @@ std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
   return rows;
 }
 
-// Lists the rows that one block of attributes takes its values from, as pieces of consecutive rows.
+// Lists the rows from which one block of attributes takes its values, as pieces of consecutive
+// rows: the first piece in joint_pieces, the others in extra_pieces.
+// In: rows  the row of each attribute of the block, or kNone
 void add_pieces(std::span<const std::uint32_t> rows, std::size_t block, RigData& out) {
   out.joint_pieces.push_back({0, 0, static_cast<std::uint16_t>(block)});
   simd::Piece* piece = &out.joint_pieces.back();

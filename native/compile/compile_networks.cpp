@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Compiles the graph of networks, and the joints that networks move. From: dna-format 12.3, 12.5
+// Compiles the graph of networks, and the joints that networks move. The nodes are operations: a
+// gather reads controls, a network computes values, a weighted sum adds values, a scatter writes
+// controls. From: dna-format 12.3, 12.5
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -52,7 +54,8 @@ dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   return type;
 }
 
-// The mask of each network: the number of the first mesh region that lists it.
+// The mask of each network: the number of the first mesh region that lists it. Also counts the
+// regions in out.mask_count.
 std::map<std::uint16_t, std::uint32_t> masks_of_networks(const dna::Dna& dna, RigData& out) {
   std::map<std::uint16_t, std::uint32_t> masks;
   for (const auto& mesh : dna.machine_learned_behavior.region_network_indices) {
@@ -283,7 +286,7 @@ class GraphCompiler {
   // The first layer of each network whose layers compute all rows at every LOD.
   std::map<std::uint16_t, std::uint32_t> layers_;
   std::vector<std::vector<std::uint32_t>> numbers_;
-  std::uint32_t first_ = 0;  // first operation of the type
+  std::uint32_t first_ = 0;  // index of the first operation of the type that add_type compiles
 };
 
 // Three rows, the directions of the axes x, y, z as (right, up, front).
@@ -297,8 +300,8 @@ std::array<std::array<float, 3>, 3> basis_of(const std::array<std::uint16_t, 3>&
   return rows;
 }
 
-// Sets the axes and the Euler convention of the joint values that networks compute, if the file
-// gives all of them.
+// Sets the axes and the Euler convention of the joint values that networks compute. They are the
+// face's unless the file gives all of them.
 void add_system(const dna::Dna& dna, RigData& out) {
   const dna::MlJoints& joints = dna.machine_learned_behavior_ext.joints;
   std::map<std::uint16_t, std::uint16_t> settings;

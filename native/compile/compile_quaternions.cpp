@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Joints that the file's joint metadata declares quaternions. From: dna-format 12.5
+// Compiles the rotations of quaternion joints, which the file's joint metadata declares
+// quaternions: each column of a joint group that rotates such a joint becomes a quaternion, a term
+// of its product. Also lists the joints that Euler angles rotate. From: dna-format 12.5
 #include <algorithm>
 #include <array>
 #include <functional>
@@ -16,7 +18,7 @@ namespace {
 
 using rig::RigData;
 
-// The first row in which each column rotates a quaternion joint; kNone: it rotates none.
+// [columns]: the first row in which the column rotates a quaternion joint; kNone: it rotates none.
 std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
                                               const std::vector<bool>& quaternion_joints) {
   const std::size_t columns = g.input_indices.size();
@@ -135,8 +137,9 @@ std::vector<std::uint32_t> quaternion_column_order(const dna::JointGroup& g,
   for (std::uint32_t c = 0; c < first.size(); ++c) {
     if (first[c] != rig::kNone) order.push_back(c);
   }
-  std::size_t live = order.size();  // values at every LOD so far
-  // the smallest row count so far; a LOD with at least as many rows leaves the order unchanged
+  // The first `live` columns of the order have values at every LOD so far.
+  std::size_t live = order.size();
+  // The smallest row count so far. A LOD with at least as many rows leaves the order unchanged.
   std::uint32_t rows = UINT32_MAX;
   for (std::size_t l = 0; l < lod_count && l < g.lods.size(); ++l) {
     if (g.lods[l] >= rows) continue;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compiles radial solvers: converted targets, radii and inverse matrices. From: dna-format 12.4
+// Compiles radial solvers, which weight their poses by the distances of the input controls from the
+// targets of the poses: converted targets, radii and inverse matrices. From: dna-format 12.4
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -36,8 +37,9 @@ double mean_distance(const RigData& r, const rig::RbfSolver& s) {
   return pairs == 0 ? 0.0 : sum / pairs;
 }
 
-// Inverts a matrix by Gauss-Jordan elimination with the largest pivot of each column.
-// Out: the smallest pivot, at most 1; 0 if the matrix is singular
+// Inverts a matrix m [n, n] by Gauss-Jordan elimination with the largest pivot of each column.
+// Out: out      [n, n] the inverse, undefined if the matrix is singular
+//      returns  the smallest absolute pivot, at most 1; 0 if the matrix is singular
 double invert(std::vector<double> m, std::vector<double>& out, std::size_t n) {
   double smallest = 1.0;
   out.assign(n * n, 0.0);
@@ -68,8 +70,9 @@ double invert(std::vector<double> m, std::vector<double>& out, std::size_t n) {
 }
 
 // Inverts the matrix of kernel values between all targets. Targets that differ only by rounding
-// make it singular. Their poses then share the weight, whereas the reference evaluator gives it to
-// any one of them.
+// make it singular; then 1e-8 is added to its diagonal. Their poses then share the weight, whereas
+// the reference evaluator gives it to any one of them. A matrix that is still singular is stored
+// itself.
 void add_inverse(rig::RbfSolver& s, RigData& out) {
   constexpr double kSingular = 1e-10, kRidge = 1e-8;
   const std::size_t n = s.pose_count;
@@ -115,7 +118,8 @@ class PoseLists {
   }
 
  private:
-  // The outputs of a pose; in files without layer rbfe its only output is its own control.
+  // Compiles the scale, inputs and outputs of a pose. In files without layer rbfe a pose has no
+  // inputs, and its only output is its own control.
   rig::RbfPose compile(std::uint16_t index) {
     const auto& ext = dna_.rbf_behavior_ext;
     rig::RbfPose pose;

@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: MIT
+// Compiles names, the neutral pose, initial values of controls, correctives (psds), blend shape
+// channels, and the conditional tables of GUI controls and animated maps. A row of a table adds
+// slope * input + cut to its output while the input is between its bounds; neighbouring rows with
+// the same input and output form a run.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -70,7 +74,8 @@ std::vector<rig::RowRun> runs_of(const std::vector<rig::ConditionalRow>& rows) {
   return runs;
 }
 
-// Lists the channels of each control. The lists stay empty if two channels write one output.
+// Lists the channels of each control. The lists stay empty if two entries of shape_outputs are the
+// same channel.
 void list_shapes_of_controls(RigData& out) {
   std::vector<bool> taken(std::size_t{UINT16_MAX} + 1);
   for (const std::uint16_t output : out.shape_outputs) {
@@ -97,7 +102,8 @@ bool has_number_bounds(const rig::ConditionalRow& row) {
   return row.from == row.from && row.to == row.to;
 }
 
-// The first row of each row's range: rows of one GUI control with equal bounds form a range.
+// The first row of each row's range: rows of one GUI control with equal bounds form a range. A row
+// with a bound that is NaN is a range of its own. Out: steps  raised by the number of comparisons
 std::vector<std::uint32_t> first_rows_of_ranges(const std::vector<rig::ConditionalRow>& rows,
                                                 std::uint64_t& steps) {
   std::vector<std::uint32_t> order(rows.size()), first(rows.size());
@@ -145,8 +151,8 @@ bool is_quaternion_w(std::string_view name) {
   return name.ends_with(".w") || name.ends_with(".qw");
 }
 
-// The initial values of controls: 1 for the w of each quaternion that solvers, setups and networks
-// read or write, 0 for all others.
+// The initial values of controls: 1 for raw controls named *.w or *.qw that solvers or twist and
+// swing setups read, and for controls of networks with such names; 0 for all others.
 void compile_initial_controls(const dna::Dna& dna, RigData& out) {
   out.initial_controls.assign(out.control_count, 0.0f);
   const auto& names = dna.definition.raw_control_names;

@@ -12,7 +12,8 @@
 
 namespace risorius::compile::detail {
 
-// A column of a joint group's matrix, and its offset in the rig's block, in floats.
+// A column of a joint group's matrix in the file, and the index of its first value in the rig's
+// joint_values.
 struct KeptColumn {
   std::uint32_t column, offset;
 };
@@ -22,14 +23,15 @@ struct KeptColumn {
 struct KeptMatrices {
   struct Matrix {
     const dna::JointGroup* group;
-    std::uint32_t rows;
+    std::uint32_t rows;  // number of rows that are stored, the first ones
     std::vector<KeptColumn> columns;
   };
   std::vector<Matrix> matrices;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> gaps;  // between columns: first, end
-  std::size_t size = 0;                                       // total, in floats
+  // Values without a column, between columns and behind the last one: first, end.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> gaps;
+  std::size_t size = 0;  // number of values of all columns and gaps
 
-  // Writes all columns into the block. Out: to  [size], overwritten
+  // Writes all columns, and zeros into the gaps. Out: to  [size], the rig's joint_values
   void write(std::span<float> to) const;
 };
 

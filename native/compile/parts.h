@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The parts of compile(). Private to native/compile.
+// The parts of compile(), which turns a Dna (a face in the form of its file) into a Rig (the form
+// for evaluation). Private to native/compile.
 #pragma once
 
 #include <cstdint>
@@ -23,12 +24,13 @@ using rig::RigData;
 /// that LOD.
 using Used = std::vector<std::vector<bool>>;
 
-/// The joint groups of a file in the order of the Rig, see list_groups().
+/// The joint groups of a file in the order of the Rig: groups that coarse LODs use come first.
 using Groups = std::vector<const dna::JointGroup*>;
 
 struct KeptMatrices;  // kept_matrices.h
 
-/// For each LOD: the operations and the solvers that run there, in the order of the file.
+/// For each LOD: the operations and the solvers that run there, as indices into ml_operations and
+/// rbf_solvers, in the order in which the file lists them for the LOD.
 struct StepLods {
   std::vector<std::vector<std::uint32_t>> operations, solvers;
 };
@@ -41,7 +43,8 @@ inline std::uint32_t count_of(const auto& list) { return static_cast<std::uint32
 /// Fails: kInvalidIndex
 Status check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
                       const std::string& where);
-/// Checks that a list has a number for each LOD. In: where  the field that owns the list
+/// Checks that a list has at least one number for each LOD. In: where  the field with the list
+/// `lods`
 /// Fails: kInvalidLength
 Status check_lods(const Array<std::uint16_t>& lods, std::uint32_t lod_count,
                   const std::string& where);
@@ -49,7 +52,7 @@ Status check_lods(const Array<std::uint16_t>& lods, std::uint32_t lod_count,
 inline bool is_corrective(const RigData& r, std::uint32_t control) {
   return control >= r.raw_count && control < r.raw_count + r.psd_count;
 }
-/// The indices that a mapping lists for a LOD.
+/// The indices that a mapping lists for a LOD; none if the mapping has no row for it.
 std::vector<std::uint32_t> listed(const dna::LodMapping& mapping, std::uint32_t lod);
 
 rig::EulerConvention euler_convention(const dna::Dna& dna);
@@ -57,14 +60,14 @@ rig::EulerConvention euler_convention(const dna::Dna& dna);
 // The steps of compile(), in their order. Each reads its layers of the Dna and fills its arrays of
 // `out`; some need arrays that earlier steps filled. Fails: as compile().
 
-/// Compiles names, sizes, the neutral pose and the table of GUI controls. In: budget  limits the
-/// sorting of that table
+/// Compiles names, sizes, the convention of Euler angles, the neutral pose, the initial values of
+/// controls and the table of GUI controls. In: budget  limits the sorting of that table
 Status compile_frame(const dna::Dna& dna, Budget& budget, RigData& out);
 /// The joint groups, sorted by the coarsest LOD that uses them, coarsest first.
 Groups list_groups(const dna::Dna& dna);
 Status compile_joint_groups(const dna::Dna& dna, const Groups& groups, RigData& out);
-/// Compiles the joint group columns that rotate quaternion joints. Call it after
-/// compile_joint_groups.
+/// Compiles the joint group columns that rotate quaternion joints, and lists the joints that Euler
+/// angles rotate. Call it after compile_joint_groups.
 /// In: groups  of the file, in the order of out.joint_groups
 void compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out);
 /// Compile the radial solvers and the networks.
@@ -80,16 +83,17 @@ Status compile_channels_and_maps(const dna::Dna& dna, RigData& out);
 Status compile_psds(const dna::Dna& dna, RigData& out);
 /// Lists the joints that a joint group, a twist or swing setup, or a network moves at any LOD.
 void list_joints_written(RigData& out);
-/// Lists the columns of all joint groups.
-/// In:  finite  all numbers of the file are known to be finite
-/// Out: kept  the columns to store; used  the controls that they read
+/// Lists the columns of all joint groups that have a value other than 0.
+/// In:  finite  true: all numbers of the file are known to be finite; false: they are tested
+/// Out: kept    the columns to store
+///      used    the controls of the columns are marked, at each LOD at which a column is not 0
 Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatrices& kept,
                        Used& used);
 /// Marks the inputs of blend shape channels and animated maps, up to the row counts of each LOD.
 void mark_channels_and_maps(const RigData& r, Used& used);
 
 /// Chooses the watcher of each corrective, the factor that decides whether it is evaluated, and
-/// fills the lists of steps of each LOD. Call it last.
+/// fills the lists of steps of each LOD. Call it after all functions above.
 /// In: used  the controls that the outputs of a LOD read
 ///     lods  the operations and solvers that run at a LOD
 Status schedule(const Used& used, const StepLods& lods, Budget& budget, RigData& out);
@@ -97,9 +101,10 @@ Status schedule(const Used& used, const StepLods& lods, Budget& budget, RigData&
 /// Adapts the rows to quaternions as output: a joint then has ten attributes, and scale begins one
 /// place later.
 Status widen_joint_rows(RigData& out);
-/// Finds the rows from which each joint attribute takes its value at each LOD.
+/// Finds the rows from which each joint attribute takes its value at each LOD, and the blocks of
+/// attributes that each group writes. Call it after widen_joint_rows, if poses have quaternions.
 void compile_pieces(const Groups& groups, RigData& out);
-/// Converts the joint matrices to float16.
+/// Writes the joint matrices as float16 to out.joint_halves. Fails: kInvalidValue (beyond 65504)
 Status narrow(const KeptMatrices& kept, RigData& out);
 
 }  // namespace risorius::compile::detail

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The order of evaluation: chooses the watched correctives, and lists the steps of each LOD.
+// The order of evaluation: chooses the watched correctives, and lists the steps of each LOD. Steps
+// are network operations, solvers and correctives. A watched corrective is evaluated only while one
+// of its factors, its watcher, is not 0.
 #include <algorithm>
 #include <functional>
 #include <iterator>
@@ -30,8 +32,10 @@ std::span<const std::uint16_t> factors(const RigData& r, const rig::Psd& p) {
 // Many lists of numbers, stored one after the other in one array.
 class Lists {
  public:
-  // In: each  each(add) must call add(list, number) for all entries. It is called twice: to count
-  //           and to fill
+  // In: lists   number of lists
+  //     budget  charged 4 bytes for each entry
+  //     each    each(add) must call add(list, number) for all entries. It is called twice: to count
+  //             and to fill
   template <class Each>
   static Result<Lists> collect(std::size_t lists, Budget& budget, Each each) {
     Lists out;
@@ -205,8 +209,8 @@ struct Order {
   std::vector<std::uint32_t> cyclic;  // members of cycles, and the nodes that depend on them
 };
 
-// Counts for each node how many nodes must still run before it, directly or because they write a
-// control that it reads.
+// Counts for each node the conditions that are not met yet: controls that it reads and that a
+// node must still write, and nodes that must run before it (Graph::after).
 class Waiting {
  public:
   // In: nodes  the nodes to run, each once; all others count as having run
@@ -292,7 +296,8 @@ Early find_early(const Graph& g) {
 }
 
 // The watcher of each corrective: the factor whose value decides whether the corrective is
-// evaluated. kNone if a factor may change after the watchers are read.
+// evaluated. kNone if a factor may change after the watchers are read, if there is no factor, or if
+// the corrective writes a raw control.
 std::vector<std::uint32_t> choose_watchers(const RigData& r, const Early& early) {
   std::vector<std::uint32_t> load(r.control_count, 0), watchers;
   const auto late = [&](std::uint16_t control) {

@@ -30,9 +30,10 @@ struct AlignedAllocator {
 
 /// The content of new memory: zeros, or undefined.
 enum class Fill { kZero, kNothing };
-/// Allocates memory that begins on a cache line. Blocks of 2 MiB and more use large pages if the
-/// system has them, because random reads then need fewer address translations.
-/// In: size in bytes
+/// Allocates memory that begins on a multiple of 64 bytes. Blocks of 2 MiB and more begin on a
+/// multiple of 2 MiB; Linux then uses large pages if it has them, because random reads then need
+/// fewer address translations.
+/// In: size  in bytes
 std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size, Fill fill = Fill::kZero);
 
 template <class T>

@@ -54,8 +54,8 @@ class Array {
   std::shared_ptr<const T> values_;
 };
 
-/// Three (or two) parallel planes of n floats in one buffer: x0..xn-1 y0..yn-1 z0..zn-1, as the
-/// format stores them. Python sees float32[n, planes] with strides.
+/// Three (or two) parallel planes of n floats in one buffer: x0..xn-1 y0..yn-1 z0..zn-1, as DNA
+/// files store them. Python sees float32[n, planes] with strides.
 template <std::size_t kPlanes>
 struct PlanarArray {
   Array<float> values;  // size = kPlanes * count()
@@ -70,8 +70,9 @@ struct PlanarArray {
 using Vec3Array = PlanarArray<3>;
 using Vec2Array = PlanarArray<2>;
 
-/// A list of structs. Copies are deep. Assigning a list replaces its storage; element_ptr() keeps
-/// the old storage alive, so that a Python object can still refer to an element of it.
+/// A list of structs. Copies are deep. Assigning a list replaces its storage; a pointer from
+/// element_ptr() keeps the old storage alive, so that a Python object can still refer to an element
+/// of it.
 template <class T>
 class List {
  public:

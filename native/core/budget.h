@@ -16,14 +16,18 @@ class Budget {
  public:
   static constexpr std::uint64_t kUnlimited = ~std::uint64_t{0};
 
-  /// In: stage  first word of the error message, e.g. "compiling"
+  /// In: stage       the beginning of the error message, e.g. "compiling this face"
+  ///     most_bytes  largest number of bytes that may be charged, or kUnlimited
+  ///     most_steps  largest number of steps that may be charged, or kUnlimited
   Budget(std::string stage, std::uint64_t most_bytes, std::uint64_t most_steps)
       : stage_(std::move(stage)), most_bytes_(most_bytes), most_steps_(most_steps) {}
 
-  /// Charges bytes. Fails: kLimitExceeded with the field, the requested total, and the limit.
+  /// Adds count to the charged bytes. Fails: kLimitExceeded if the sum exceeds most_bytes; the
+  /// error contains the field `where`, the sum and the limit. The count stays charged.
   Status take_bytes(std::uint64_t count, const std::string& where) {
     return take(count, bytes_, most_bytes_, "bytes", where);
   }
+  /// Like take_bytes, for steps and most_steps.
   Status take_steps(std::uint64_t count, const std::string& where) {
     return take(count, steps_, most_steps_, "steps", where);
   }

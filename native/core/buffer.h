@@ -14,8 +14,8 @@
 namespace risorius::core {
 
 /// An array whose new elements have no defined value, so that its memory is only written when the
-/// array is filled. It becomes an Array without a copy. Growth uses std::realloc, which moves pages
-/// instead of bytes.
+/// array is filled. It becomes an Array without a copy. Growth uses std::realloc, which can move
+/// large arrays by pages without copying their bytes.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= alignof(std::max_align_t));
@@ -29,8 +29,8 @@ class Buffer {
   T* data() { return data_.get(); }
   T& operator[](std::size_t i) { return data_.get()[i]; }
 
-  /// Changes the size and preserves the elements. The first call allocates exactly n elements;
-  /// later growth is at least by half.
+  /// Changes the size and preserves the elements. An empty buffer without memory allocates exactly
+  /// n elements; later growth is at least by half of the capacity. Shrinking keeps the memory.
   void resize(std::size_t n) {
     if (n > capacity_) allocate(capacity_ == 0 ? n : std::max(n, capacity_ + capacity_ / 2));
     size_ = n;
@@ -38,7 +38,8 @@ class Buffer {
   void reserve(std::size_t n) {
     if (n > capacity_) allocate(n);
   }
-  /// Shrinks the memory to the array's size and transfers the ownership of it.
+  /// Shrinks the memory to the array's size and returns its ownership. The buffer is empty after
+  /// it.
   std::shared_ptr<const T> release() {
     if (size_ < capacity_) allocate(size_);
     size_ = capacity_ = 0;

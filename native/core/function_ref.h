@@ -12,9 +12,9 @@ namespace risorius::core {
 template <class Signature>
 class FunctionRef;
 
-/// A reference to a function or lambda, which must outlive it. It has two pointers and allocates
-/// nothing. A function with a FunctionRef parameter is compiled once, whereas a template is
-/// compiled for each lambda.
+/// A reference to a function or lambda, which must outlive the reference. The reference has two
+/// pointers and allocates nothing. A function with a FunctionRef parameter is compiled once,
+/// whereas a template is compiled for each lambda.
 template <class Result, class... Args>
 class FunctionRef<Result(Args...)> {
  public:

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Divides a loop into ranges that several threads compute.
 #pragma once
 
 #include <algorithm>
@@ -12,10 +13,11 @@
 namespace risorius::core {
 
 /// Calls body(begin, end) on ranges that cover [0, n), on up to `threads` threads (0: all cores;
-/// never more than 256). The first exception of a body, such as bad_alloc, is thrown again after
-/// all threads have ended.
-/// In: ranges  number of ranges per thread; use several if ranges may differ much in work, because
-///             a thread that is done takes the next range
+/// never more than n or 256). With one thread, the caller's thread calls body(0, n) once, even if n
+/// is 0. The first exception of a body, such as bad_alloc, is thrown again after all threads have
+/// ended; the other threads still compute the remaining ranges.
+/// In: ranges  number of ranges per thread, 1 or more; use several if ranges may differ much in
+///             work, because a thread that is done takes the next range
 template <class Body>
 void parallel_for(std::size_t n, std::size_t threads, const Body& body, std::size_t ranges = 1) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());

@@ -16,12 +16,12 @@ enum class ErrorCode {
   kNotClip,                // the file does not begin with the signature of a .rzc file
   kUnsupportedGeneration,  // a DNA file of a generation other than 2, or a clip of another version
   kTruncated,              // the bytes end inside a structure
-  kInvalidCount,           // a count that does not fit the remaining bytes or a limit
-  kInvalidLength,          // parallel lists of different lengths
+  kInvalidCount,           // a count that does not fit the remaining bytes
+  kInvalidLength,          // a list of a wrong length, such as parallel lists of different lengths
   kInvalidIndex,           // an index outside its range
   kInvalidValue,           // any other impossible value (cycle, LOD row beyond the matrix ...)
   kMissingLayer,           // the file lacks a layer that the operation needs
-  kLimitExceeded,          // more than the caller's limits allow
+  kLimitExceeded,          // more than a limit of the caller, an index or a budget allows
   kIoOpen,
   kIoRead,
   kIoWrite,
@@ -33,7 +33,7 @@ const char* to_string(ErrorCode code);
 
 /// An error.
 /// offset   byte offset in the file, if the error has one
-/// where    the DNA field, e.g. "behavior.joint_groups[3].values"
+/// where    the field of the DNA or clip, e.g. "behavior.joint_groups[3].values", or ""
 /// message  one sentence with the found and the expected value
 struct Error {
   ErrorCode code = ErrorCode::kInvalidValue;
@@ -41,7 +41,7 @@ struct Error {
   std::string where;
   std::string message;
 
-  /// One sentence for the user: message, field and offset.
+  /// One sentence for the user: the message, then "[where]" and "(byte offset)" if they are known.
   std::string describe() const;
 };
 

@@ -64,7 +64,8 @@ template <class T>
 Array<T> only(const Array<T>& values, const std::vector<bool>& keep) {
   std::vector<T> out;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (keep[i % keep.size()]) out.push_back(values[i]);  // `keep` applies to the columns
+    if (keep[i % keep.size()])
+      out.push_back(values[i]);  // keep: [columns]; values: rows of columns
   }
   return out;
 }
@@ -117,8 +118,8 @@ class Forgetting {
   void inputs(const std::vector<bool>& keep, Array<std::uint16_t>& indices) {
     if (!keep.empty()) indices = renumbered(map_, only(indices, keep));
   }
-  // Removes correctives that would always be 0. A corrective is a product, so that it is 0 if one
-  // factor is a removed control.
+  // Removes the factors of correctives that are removed or would always be 0. A corrective is a
+  // product, so that it is 0 if one factor is a removed control.
   void psds() {
     Psds& p = dna_.behavior.psds;
     std::vector<bool> is_lost(map_.size(), false);

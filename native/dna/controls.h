@@ -32,16 +32,19 @@ namespace detail {
 void drop_layer(std::string_view id, Dna& dna);
 
 /// Removes the unread controls from the control space and renumbers the others, so that the Dna can
-/// be written as a complete file. Everything that an unread control drives is removed, because it
-/// would remain 0: columns of joint groups, entries of channels and maps, and correctives with such
-/// a factor.
-/// Out: number of removed columns, entries and correctives
+/// be written as a complete file. Everything that an unread control drives is removed, because the
+/// control would remain 0: columns of joint groups, entries of channels and maps, and the factors
+/// of correctives with such a factor. These correctives keep their control, which remains 0.
+/// Out:   number of removed columns and entries, and of correctives that lost their factors
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control)
 core::Result<std::size_t> forget_unread_controls(Dna& dna);
 
-/// As forget_unread_controls, for any controls. The caller must then correct the numbers of raw,
-/// corrective, network and pose controls.
-/// In: keep  [controls] whether each control remains; true for all raw controls
+/// Removes any controls other than raw controls, with everything that they drive, in the same way
+/// as forget_unread_controls. The caller must then correct the fields from which the sizes of the
+/// control space are computed, such as psd_count.
+/// In: keep  [controls] whether each control remains; must be true for each raw control
+/// Out: number of removed columns and entries, and of correctives that lost their factors because a
+///      factor was removed
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes a removed control)
 core::Result<std::size_t> forget_controls(const std::vector<bool>& keep, Dna& dna);
 

@@ -75,7 +75,8 @@ struct Conditionals {
 };
 
 /// Correctives, as a sparse matrix in coordinate form. Each entry gives a corrective (row, its
-/// control index) a factor (column, the factor's control index).
+/// control index) a factor (column, the factor's control index). The product of a corrective's
+/// values is its weight: the corrective is min(1, weight * product of its factors).
 struct Psds {
   Array<std::uint16_t> rows, columns;
   Array<float> values;
@@ -166,8 +167,9 @@ struct MachineLearnedBehavior {
 };
 
 /// A node of the graph of layer mlbe. Its parameters depend on its type. Gather and scatter:
-/// control indices. MLP: the network's number, then optionally the rows of each layer at each LOD
-/// (layer-major). Weighted sum: the number of outputs, then the bits of one float per dependency.
+/// control indices. MLP: the network's index, then optionally the number of rows of each network
+/// layer at each LOD (layer-major). Weighted sum: the number of outputs, then one weight per
+/// dependency, as the bits of a float.
 struct MlOperation {
   Array<std::uint32_t> parameters;
   Array<std::uint16_t> operation_set_dependency_indices, operation_dependency_indices;
@@ -181,9 +183,11 @@ struct MlType {
   bool operator==(const MlType&) const = default;
 };
 
-/// Joints that networks move. output_indices: joint * stride + attribute; the stride is 9, or 10
-/// with quaternions. parameter_keys: 0 type of translation, 1 type of rotation (0 Euler,
-/// 1 quaternion), 2 type of scale, 3 to 5 axes, 6 to 8 rotation signs, 9 rotation sequence.
+/// Joints that networks move. input_indices: control indices. output_indices, parallel to them:
+/// joint * stride + attribute; the stride is 9, or 10 with quaternions. parameter_values has the
+/// value of each key in parameter_keys: 0 type of translation, 1 type of rotation (0 Euler,
+/// 1 quaternion), 2 type of scale, 3 to 5 axes, 6 to 8 rotation signs (1 for 1, 0 for -1),
+/// 9 rotation sequence.
 struct MlJoints {
   Array<std::uint16_t> parameter_keys, parameter_values, input_indices, output_indices;
   bool operator==(const MlJoints&) const = default;
@@ -205,7 +209,7 @@ struct RbfSolver {
   std::uint16_t solver_type = 0;       // 0 additive 1 interpolative
   std::uint16_t automatic_radius = 0;  // 0 on 1 off
   std::uint16_t distance_method = 0;   // 0 euclidean 1 quaternion 2 swing angle 3 twist angle
-  std::uint16_t normalize_method = 0;  // 0 only above one 1 always
+  std::uint16_t normalize_method = 0;  // 0 if weights sum to over 1, 1 always
   std::uint16_t function_type = 0;     // 0 gaussian 1 exponential 2 linear 3 cubic 4 quintic
   std::uint16_t twist_axis = 0;        // 0 x 1 y 2 z
   bool operator==(const RbfSolver&) const = default;
@@ -225,8 +229,8 @@ struct RbfBehavior {
   bool operator==(const RbfBehavior&) const = default;
 };
 
-/// The output controls of a pose of layer rbfb. Each gets its weight times the pose's value times
-/// the product of the input controls.
+/// The output controls of a pose of layer rbfb. To each, the pose adds its output weight times the
+/// pose's value times the product of the input controls.
 struct RbfPoseControls {
   Array<std::uint16_t> input_control_indices, output_control_indices;
   Array<float> output_control_weights;
@@ -247,7 +251,7 @@ struct JointRepresentation {
   bool operator==(const JointRepresentation&) const = default;
 };
 
-/// Layer jbmd: one entry per joint.
+/// Layer jbmd: the representation of each joint's translation, rotation and scale.
 struct JointBehaviorMetadata {
   List<JointRepresentation> joint_representations;
   bool operator==(const JointBehaviorMetadata&) const = default;

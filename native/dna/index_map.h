@@ -11,7 +11,8 @@
 
 namespace risorius::dna::detail {
 
-/// Maps old indices to new ones; removed elements map to kDropped.
+/// Maps the old indices of the elements that stay to their new indices. Call keeps() first:
+/// operator[] has no meaning for a removed element.
 class IndexMap {
  public:
   static constexpr std::uint32_t kDropped = 0xFFFFFFFF;
@@ -34,6 +35,8 @@ class IndexMap {
 /// Lowers the row counts of LODs after rows were removed. LOD l uses the rows [0, lods[l]), so that
 /// removing row r lowers every count above r. Each row is visited once, independent of the number
 /// of LODs.
+/// In:     keep  [rows] whether each row stays
+/// In/out: lods  [LODs] number of leading rows that each LOD uses
 template <class Keep>
 void drop_rows(const Keep& keep, core::Array<std::uint16_t>& lods) {
   std::vector<std::uint16_t> kept_before{0};

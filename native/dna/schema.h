@@ -5,10 +5,12 @@
 // A visitor has
 //   field(name, value)              numbers, texts, Arrays, lists of them, structs with a describe
 //   group(name, body)               a struct of the format that Dna lacks; only JSON nests it
-//   sized(name, list, mapping)      a list whose elements are preceded by their size; mapping tells
-//                                   which elements a LOD needs, or is null
+//   sized(name, list, mapping)      a list whose elements are preceded by their size in bytes (in
+//                                   2.1, meshes: by their end's offset); mapping lists the
+//                                   elements that each LOD needs, or is null
 //   faces(mesh), skin(mesh), targets(mesh)   lists that Dna keeps flat, or that a LOD may drop
 //   setups(name, list, twist)       lists of describe_setup
+//   matrix(name, joint group)       the values of a joint group; a reader may leave out rows
 #pragma once
 
 #include <type_traits>
@@ -59,8 +61,8 @@ void describe(V& v, D& d) {
   v.field("db_name", d.db_name);
 }
 
-/// The winding order is not described here but read and written by the container, because only
-/// files from 2.8 on have it.
+/// The winding order is not described here: the readers and writers of files and of JSON treat it
+/// separately, because only files from 2.8 on have it.
 template <class V, Of<DescriptorExt> D>
 void describe(V& v, D& d) {
   v.field("rotation_sequence", d.rotation_sequence);

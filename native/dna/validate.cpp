@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Checks the layers of a Dna: errors refuse the file, oddities are warnings.
 #include "dna/validate.h"
 
 #include <algorithm>
@@ -29,7 +30,7 @@ T largest(const Array<T>& values) {
   return top;
 }
 
-// Collects errors and oddities of a Dna, at most one finding for each list.
+// Collects errors and oddities of a Dna. Each check of a list gives at most one finding.
 class Checker {
  public:
   explicit Checker(detail::Known known) : known_(known) {}
@@ -110,7 +111,8 @@ class Checker {
   struct Odd {
     std::size_t first = 0, count = 0;
   };
-  /// The first index below size for which is_odd is true, and how many there are.
+  /// The first index below `size` for which is_odd is true (0 if there is none), and the number of
+  /// such indices.
   template <class IsOdd>
   static Odd find_odd(std::size_t size, const IsOdd& is_odd) {
     Odd out;
@@ -536,7 +538,7 @@ void check_setups(Checker& c, const Where& name, const List<TwistSwingSetup>& se
 void check_layers(Checker& c, const Dna& dna, bool geometry) {
   check_descriptor(c, dna);
   check_definition(c, dna);
-  // Without a definition (a descriptor-only load) there are no sizes to check indices against.
+  // An empty behavior has nothing to check; it is empty if it was not loaded.
   if (dna.behavior != Behavior{}) check_behavior(c, dna);
   if (geometry) check_geometry(c, dna);
   check_networks(c, dna);

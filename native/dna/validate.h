@@ -32,10 +32,12 @@ struct Known {
   bool vertex_indices = false;
 };
 
-/// Makes the checks of validate, and returns all errors and oddities, not only the first error.
+/// Makes the checks of validate, and returns all errors and oddities. The first 1,000 are returned,
+/// and the first error even if it comes later. For several equal faults in one list, only the first
+/// is returned, with the number of the others in its message.
 std::vector<Finding> find_all(const Dna& dna, Known known = {});
 
-/// The validate() above without the checks that `known` makes unnecessary.
+/// Makes the checks of dna::validate, except those that `known` makes unnecessary.
 core::Status validate(const Dna& dna, Known known, std::vector<Warning>& warnings);
 
 }  // namespace detail

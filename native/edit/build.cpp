@@ -25,10 +25,10 @@ constexpr std::size_t kMost = 65535;  // rows or columns
 // The sort key of a new joint group. Groups are written in ascending order of it. If two groups
 // write the same row, the later one wins.
 struct GroupKey {
-  std::uint32_t below;  // higher layers come first
+  std::uint32_t below;  // highest layer - layer, so that higher layers come first
   // levels: the number of LODs of each unit of the group if units with another number of LODs must
-  // not be in it, because they would change the order of its columns; else 0. The group of a bundle
-  // has no region.
+  // not be in it, because they would change the order of its columns; else 0. region is 0 for a
+  // bundle, which may have joints of several regions.
   std::uint32_t region, chain, bundle, order, levels;
   auto operator<=>(const GroupKey&) const = default;
 };

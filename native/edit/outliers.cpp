@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Removes from joint groups the small coefficients in columns whose control moves few joints of the
+// region, and rows that are all 0.
 #include <algorithm>
 
 #include "dna/controls.h"
@@ -8,8 +10,8 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// Counts for each corrective in watched_correctives() and each LOD how many rows, channels and maps
-// read the corrective.
+// Counts for each corrective in watched_correctives() and each LOD the coefficients other than 0 in
+// joint groups and the entries of channels and maps that read the corrective.
 class Uses {
  public:
   Uses(const dna::Dna& dna, const std::vector<Unit>& units)
@@ -64,7 +66,7 @@ class Uses {
   std::vector<std::int64_t> counts_;  // [controls, LODs]
 };
 
-// How many joints of a region each control moves.
+// [controls] how many joints of a region each control moves. In: units  of the region, by joint
 std::vector<std::uint32_t> count_joints(const std::vector<const Unit*>& units,
                                         std::size_t controls) {
   std::vector<std::uint32_t> counts(controls, 0), last(controls, UINT32_MAX);

@@ -33,7 +33,8 @@ class Skeleton {
  public:
   Skeleton(const dna::Dna& dna, const rig::EulerConvention& euler);
   std::size_t joint_count() const { return parents_.size(); }
-  /// In: delta  tx ty tz rx ry rz sx sy sz, the joint's attributes in a pose
+  /// A joint's transform relative to its parent in a pose. In: delta  tx ty tz rx ry rz sx sy sz,
+  /// the joint's attributes in the pose
   Local local(std::size_t joint, const float* delta) const;
   /// Computes positions in the face. In: locals  of all joints
   /// Out: positions  [joints], in the file's units and axes

@@ -27,7 +27,7 @@ constexpr std::size_t kJointsOfGroup = 14, kFewGroups = 16;
 constexpr std::int64_t kMostRows = 65535;  // the format counts rows of a LOD in 16 bits
 
 struct Cluster {
-  std::vector<std::uint64_t> controls;  // as bits
+  std::vector<std::uint64_t> controls;  // bit c: control c moves a joint of the cluster
   std::int64_t rows = 0, columns = 0;
   Vector centre{};  // of the neutral positions
   std::vector<std::uint32_t> joints;
@@ -45,8 +45,9 @@ std::int64_t columns_of_both(const Cluster& a, const Cluster& b) {
   return n;
 }
 
-// The change of cost by a merge; the smallest is the best. Of equal changes, the one with the
-// smaller distance of the clusters is better.
+// A merge of a cluster with cluster number `with`, and the change of the cost by it: the smallest
+// is the best. Of equal changes, the one with the smaller (squared) distance of the clusters is
+// better.
 struct Merge {
   std::int64_t change = 0;
   double distance = 0.0;
@@ -123,8 +124,8 @@ class Clustering {
   std::size_t count_;
 };
 
-// The strongest effect of each control on one joint, as a share of the threshold. At a quaternion
-// joint it is raised by 1, so that no control counts as weak.
+// The strongest effect of each control on one joint, divided by the threshold. At a quaternion
+// joint it is raised by 1, so that no control counts as weak (below 1).
 using Strengths = std::map<std::uint16_t, double>;
 
 // The strength below which a control does not count for a joint. If most controls of the joint are
@@ -155,7 +156,7 @@ std::vector<Vector> neutral_positions(const dna::Dna& dna) {
   return positions;
 }
 
-// One cluster for each joint that no given region lists.
+// One cluster for each joint that has units and that no region of the options lists.
 std::vector<Cluster> list_clusters(const dna::Dna& dna, std::span<const Unit> units,
                                    const Effects& effects, bool significant_only,
                                    const std::vector<std::uint32_t>& of_joint) {

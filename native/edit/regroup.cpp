@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Rebuilds the joint groups of a face as dense groups of regions of joints.
 #include "edit/regroup.h"
 
 #include <algorithm>
@@ -86,8 +87,10 @@ std::vector<std::vector<std::uint16_t>> list_regions(const detail::Regions& regi
   return out;
 }
 
-// Finds regions by significant coefficients and removes the small coefficients foreign to them.
-// Repeats this until none is removed, so that a second regroup changes nothing.
+// Finds regions and removes small coefficients from columns foreign to their region, in each pass
+// first with the regions by significant coefficients, then with the regions by all coefficients.
+// Repeats this until none is removed, so that a second regroup changes nothing, but at most
+// kMostPasses times. Out: the last regions by all coefficients.
 detail::Regions settle(const dna::Dna& dna, const RegroupOptions& options,
                        std::vector<detail::Unit>& units, std::uint64_t& removed) {
   const detail::Effects effects(dna, options.threshold);

@@ -12,7 +12,7 @@
 namespace risorius::edit {
 
 /// The effects below which a coefficient is small, measured while its control is 1. 0: no
-/// coefficient is small.
+/// coefficient of this kind is small.
 struct Threshold {
   double translation_mm = 0.0;
   double rotation_degrees = 0.0;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Lists the rows of joint groups as units: single rows, or all rotation rows of a quaternion
+// joint. Finds which units overwrite each other and which may share a group.
 #include "edit/units.h"
 
 #include <algorithm>

@@ -26,17 +26,21 @@ struct Unit {
   std::uint32_t joint = 0;
   // Whether the joint is a quaternion joint. None of its coefficients counts as small.
   bool is_quaternion = false;
-  std::uint32_t layer = 0;  // number of units in later groups that write the same rows
-  std::uint32_t chain = 0;  // units of one chain have LODs that nest in each other
+  // 0, or more than the layer of each later unit that writes the same output.
+  std::uint32_t layer = 0;
+  // 0 if every row is used from LOD 0 up to some LOD, or if the unit is in a bundle. Units of
+  // different chains never share a group, because the sets of LODs that use their rows need not
+  // nest in each other.
+  std::uint32_t chain = 0;
   std::uint32_t order = kAnyOrder;
-  // Units of one bundle form a group without other units; 0: no bundle. If rotation rows of a
-  // quaternion joint begin at different LODs, the order of its columns depends on the other
-  // quaternion joints of the source group, so that all of them must be in one bundle.
+  // Units of one bundle form a group without other units; 0: no bundle. If the rotation rows of a
+  // quaternion joint are used by different numbers of LODs, the order of its columns depends on the
+  // other quaternion joints of the source group, so that all of them must be in one bundle.
   std::uint32_t bundle = 0;
   std::vector<Row> rows;
   std::vector<std::uint16_t> columns;  // controls; of a linear unit: ascending, each once
-  // [columns] if order >= kOfGroup: the column's place in the order of the source group; else
-  // unused.
+  // [columns] if order >= kOfGroup: position of the column in the source group's order of
+  // multiplication; else unused.
   std::vector<std::uint32_t> source;
   std::vector<float> values;  // [rows, columns]
 
@@ -46,20 +50,22 @@ struct Unit {
 /// A unit for every row or joint rotation that some LOD uses, sorted by joint and then by place in
 /// the file. Columns of zeros are dropped, and columns of the same control are added (except for
 /// quaternions).
-/// In: a Dna that compile accepts
+/// In: dna  a face that compile::compile accepts
 std::vector<Unit> list_units(const dna::Dna& dna);
 
-/// Numbers the units that write the same row: the last one gets layer 0, the one before it layer 1,
-/// and so on. Higher layers are written first. Units that others overwrite at every LOD are
-/// removed, unless they keep a corrective in use.
+/// Numbers the units that write the same output: the last one gets layer 0, the one before it layer
+/// 1, and so on; the units of a bundle all get the highest of their layers. Higher layers are
+/// written first. Units that later ones overwrite at every LOD are removed, unless they keep a
+/// corrective in use or belong to a bundle.
 void find_layers(const dna::Dna& dna, std::vector<Unit>& units);
 
-/// Computes the effect of a coefficient while its control is 1, as a share of the threshold. A
-/// coefficient with an effect below 1 is small.
+/// Computes the effect of a coefficient while its control is 1, divided by the threshold of its
+/// kind (translation, rotation or scale). A coefficient with a result below 1 is small.
 class Effects {
  public:
   Effects(const dna::Dna& dna, const Threshold& threshold);
-  /// In: output  joint * 9 + attribute. Out: the effect as a share of the threshold.
+  /// In: output  joint * 9 + attribute. Out: effect / threshold; infinity if the threshold is 0 and
+  /// the value is not
   double of(std::uint16_t output, float value) const;
   bool nothing_is_small() const { return nothing_is_small_; }
 
@@ -68,9 +74,9 @@ class Effects {
   bool nothing_is_small_;
 };
 
-/// [controls] true for correctives that are read by something other than joint groups, channels and
-/// maps. If no LOD used such a corrective, evaluation would leave it at 0, and its readers would
-/// change.
+/// [controls] true for correctives that other correctives, networks, gather operations, RBF solvers
+/// and poses, or twist and swing setups read. At a LOD that does not use such a corrective,
+/// evaluation would leave it at 0, and its readers would change.
 std::vector<bool> watched_correctives(const dna::Dna& dna);
 
 /// The value in Regions::of_joint for a joint that no unit moves; other values are region numbers.
@@ -80,20 +86,26 @@ struct Regions {
   std::uint32_t count = 0;
 };
 
-/// Divides the joints into regions. In: significant_only  ignore small coefficients when joints are
-/// compared
+/// Divides the joints that units move into regions: the regions of the options, then clusters of
+/// joints that the same controls drive. In: significant_only  true: a joint's controls with only
+/// small coefficients are ignored, but never more than the weaker half of its controls
 Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const Effects& effects,
                      const RegroupOptions& options, bool significant_only);
 
-/// Removes small coefficients from columns foreign to their region. Out: number of removed
-/// coefficients
+/// Removes small coefficients from columns foreign to their region, except at quaternion joints,
+/// and except the last use of a watched corrective at some LOD.
+/// In:  foreign_share  a column is foreign if its control moves at most this share of the region's
+///                     joints
+/// Out: number of removed coefficients
 std::uint64_t remove_outliers(const dna::Dna& dna, const Regions& regions, const Effects& effects,
                               double foreign_share, std::vector<Unit>& units);
 
-/// Removes rows that are all 0 from joints that have another row. Call it after find_layers.
+/// Removes rows that are all 0, except at quaternion joints and at joints where several units write
+/// one output. Of each joint at least one row stays. Call it after find_layers.
 void remove_zero_rows(std::vector<Unit>& units);
 
-/// Fails: kLimitExceeded
+/// Builds the dense joint groups of all regions from the units. Fails: kLimitExceeded (a group that
+/// does not fit the format)
 core::Result<std::vector<dna::JointGroup>> build_groups(const dna::Dna& dna,
                                                         const std::vector<Unit>& units,
                                                         const Regions& regions);

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT
- * smile: an example program with a face. It opens a DNA file, moves one control from rest to 1 at the
- * most and at the least detailed LOD, and prints the joint, shape and map with the largest motion.
+ * smile: an example program with a face. It opens a DNA file, sets one control to 0.5 and to 1 at
+ * the most and at the least detailed LOD, and prints each time the sum of the outputs and the
+ * joint, shape and map with the largest output.
  *
  *     smile FILE.dna [CONTROL]
  */
 #include <math.h>
+#include <risorius.h>
 #include <stdio.h>
 #include <string.h>
-
-#include <risorius.h>
 
 static int complain(void) {
   const risorius_error* error = risorius_last_error();
@@ -19,7 +19,8 @@ static int complain(void) {
   return 1;
 }
 
-/* The raw control of this name or with this last part; otherwise the first one. */
+/* Index of the raw control with this name, or with this part after the last "." of its name;
+ * otherwise 0. */
 static uint32_t find_control(const risorius_face* face, const char* wanted) {
   const uint32_t count = risorius_count(face, RISORIUS_RAW_CONTROLS);
   for (uint32_t i = 0; wanted != NULL && i < count; ++i) {

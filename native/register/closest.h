@@ -43,14 +43,15 @@ class ClosestPoints {
   ClosestPoints(ClosestPoints&&) noexcept;
   ClosestPoints& operator=(ClosestPoints&&) noexcept;
 
-  /// The closest point of the surface to each query.
-  /// In: normals  one for each query, of any length; triangles with too different normals are
-  ///              ignored; empty: every triangle counts
+  /// The closest point of the surface to each query; triangle -1 and an infinite distance if the
+  /// limits allow none.
+  /// In: normals  one for each query, of any length; triangles with too different normals
+  ///              (Limits::least_cosine) are ignored; empty: every triangle counts
   /// Fails: kInvalidLength (normals), kInvalidValue (a query that is not finite)
   core::Result<std::vector<Hit>> nearest(const std::vector<Vector3>& queries,
                                          const std::vector<Vector3>& normals, Limits limits) const;
   /// The first point at which each ray meets the surface, from outside or inside. `distance` is in
-  /// the unit of the points.
+  /// the unit of the points. Of the limits, least_cosine is ignored.
   /// Fails: kInvalidLength (directions), kInvalidValue (a ray that is not finite or has no
   ///        direction)
   core::Result<std::vector<Hit>> first_hit(const std::vector<Vector3>& origins,

@@ -32,7 +32,7 @@ struct Mesh {
 /// A vertex of the template and the corresponding point of the target.
 struct Pair {
   std::uint32_t vertex = 0;
-  Vector3 point{};
+  Vector3 point{};      // in the target's unit
   double weight = 1.0;  // against other pairs, 0 to 1e6
 };
 
@@ -50,8 +50,8 @@ struct RegisterOptions {
   std::vector<std::uint8_t> trusted;
   /// [template vertices] the mirror vertex, in the middle the vertex itself; empty: no symmetry.
   std::vector<std::uint32_t> mirrored;
-  /// Each vertex also gets its mirror vertex's match, reflected, with this factor of its weight; 0:
-  /// no symmetry.
+  /// In the coarse steps, each vertex also gets its mirror vertex's match, reflected, with this
+  /// factor of its weight; 0: no symmetry.
   double symmetry = 0.0;
   std::size_t nodes = 2000;  // number of nodes of the coarse steps
   double noise = 2.0;        // expected error of the points of pairs in mm
@@ -59,23 +59,23 @@ struct RegisterOptions {
 };
 
 struct Registered {
-  std::vector<Vector3> points;         // [template vertices] positions on the target
+  std::vector<Vector3> points;         // [template vertices] final positions, in the target's unit
   std::vector<std::int32_t> triangle;  // [template vertices] nearest target triangle; -1: none
   std::vector<Vector3> shares;         // barycentric coordinates in the triangle, sum 1
   std::vector<double> distance;        // from the triangle, in the target's unit
-  std::vector<std::uint8_t> trusted;   // not 0: the vertex has a counterpart on the target
+  std::vector<std::uint8_t> trusted;   // not 0: has a counterpart, within 0.5 mm of the target
 };
 
 /// Called with the share of the work that is done, 0 to 1; returning false stops the work.
 using Progress = std::function<bool(double)>;
 
 /// Registers a template onto a target.
-/// In: start  [template vertices] positions near the target; empty: computed from the pairs, of
-///            which at least three must not lie on a line
+/// In: start  [template vertices] positions near the target, in the target's unit; empty: computed
+///            from the pairs, of which at least three must not lie on a line
 /// Fails: kInvalidArgument (options, too few triangles or pairs, no surface of the target near the
 ///        start; "stopped" if progress returned false), kInvalidLength (start, options),
-///        kInvalidIndex (a corner, a pair's vertex), kInvalidValue (not finite), kLimitExceeded
-///        (vertices)
+///        kInvalidIndex (a corner, a pair's vertex, options.mirrored), kInvalidValue (not finite, a
+///        pair's weight), kLimitExceeded (vertices, triangles)
 /// Cost: about 60 bytes per vertex of the target and 2 kB per vertex of the template
 core::Result<Registered> register_surface(const Mesh& templ, const Mesh& target,
                                           const std::vector<Pair>& pairs,

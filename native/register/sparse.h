@@ -19,7 +19,7 @@ class SparseCholesky {
   ///                            summed, entries above the diagonal are ignored
   ///     size                   number of rows of the matrix
   /// Fails: kInvalidLength (lists), kInvalidIndex, kInvalidValue (not finite, or not positive
-  ///     definite)
+  ///     definite), kLimitExceeded (size)
   static core::Result<SparseCholesky> make(std::span<const std::int32_t> rows,
                                            std::span<const std::int32_t> columns,
                                            std::span<const double> values, std::size_t size);

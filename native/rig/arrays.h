@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The contents of a compiled face: one header of plain numbers and about fifty arrays.
+// The contents of a compiled face: one header of plain numbers and about sixty arrays.
 //
 // compile() fills the arrays as std::vectors (RigData). make_rig() then copies them into one block
 // of bytes, and a Rig sees each array as a view into that block. Arrays refer to each other by
@@ -64,17 +64,18 @@ struct Watch {
 ///
 /// The matrix is stored column by column, a column for each control, in joint_values or
 /// joint_halves. The columns of one control in all groups are stored one after the other, so that a
-/// control is one run of memory. Columns of kWidest rows and more begin on whole vectors; others
-/// have no padding.
+/// control is one run of memory. Columns of at least kWidest (16) rows begin at a multiple of
+/// kWidest values; shorter columns have no padding.
 struct JointGroup {
   std::uint32_t row_count = 0;
   std::uint32_t column_count = 0;  // columns that hold at least one value other than 0
-  // The first row of this group among the rows of all groups. A group of kWidest rows or more takes
-  // whole vectors of rows, so that the rest of its last vector is unused. Smaller groups have no
-  // padding.
+  // The first row of this group among the rows of all groups. A group of at least kWidest (16) rows
+  // begins and ends at a multiple of kWidest rows, so that rows after its last row are unused.
+  // Smaller groups have no padding.
   std::uint32_t rows_begin = 0;
   std::uint32_t columns_begin = 0;  // its first column in group_columns
-  // The blocks of joint attributes that this group's rows write at any LOD: see joint_pieces.
+  // The range of blocks (16 consecutive joint attributes, see joint_pieces) that the rows of this
+  // group write at any LOD: from blocks_begin up to, not including, blocks_end.
   std::uint32_t blocks_begin = 0, blocks_end = 0;
 };
 
@@ -95,14 +96,15 @@ using JointColumn = simd::Addend;
 struct QuaternionJoint {
   std::uint32_t joint = 0;
   std::uint32_t group = 0;  // an index into joint_groups
-  // The joint's first rotation row in the group. A LOD with at most first_row rows leaves the
-  // rotation out.
+  // The joint's first rotation row in the group. A LOD that has at most first_row rows of the group
+  // leaves the rotation out.
   std::uint32_t first_row = 0;
 };
 
-/// A column that rotates joints by quaternions. The columns are ordered by group, and within a
-/// group as in the file. The rotations are multiplied in this order, each from the left, because
-/// quaternions do not commute.
+/// A column that rotates joints by quaternions. The columns are ordered by group as in the file,
+/// and within a group as the reference evaluator stores them, see quaternion_column_order() of the
+/// compiler. The rotations are multiplied in this order, each from the left, because quaternions do
+/// not commute.
 struct QuaternionColumn {
   std::uint32_t control = 0;
   std::uint32_t terms_begin = 0, terms_end = 0;  // its terms in quaternion_terms
@@ -127,9 +129,10 @@ struct RbfSolver {
   std::uint32_t inverse_begin = 0;  // the matrix [poses, poses] in rbf_inverses, if interpolative
   std::uint32_t interpolative = 0;  // 1: at the target of a pose the solver gives that pose alone
   // The distance, the function that turns a distance into a weight, and the axis of the twist, as
-  // numbers of the file format; stages/rbf.cpp defines them.
+  // numbers of the file format; stages/rbf.h lists them.
   std::uint32_t distance = 0, function = 0, axis = 0;
-  std::uint32_t always_normalize = 0;  // 1: weights sum to 1 however small they are
+  // 1: the weights are divided by their sum, unless it is 0; 0: only if their sum is above 1.
+  std::uint32_t always_normalize = 0;
 };
 
 /// A pose of a solver. To each output control it adds weight * value * the product of its inputs;
@@ -154,8 +157,9 @@ struct MlOperation {
   // adds values of other operations; kScatter copies values to controls.
   enum Kind : std::uint32_t { kGather = 1, kScatter = 2, kMlp = 3, kWeightedSum = 4 };
   std::uint32_t kind = kGather;
-  // The region whose mask switches the operation off. For kMlp it is the region of its network, for
-  // kScatter the region of the network whose values it writes. kNone: no mask.
+  // The region whose mask switches the operation off while the mask is 0, an index into the masks
+  // of a Workspace. For kMlp it is the region of its network, for kScatter the region of the
+  // network whose values it writes. kNone: no mask.
   std::uint32_t mask = kNone;
   std::uint32_t values_begin = 0, value_count = 0;      // its results, in operation_values
   std::uint32_t segments_begin = 0, segment_count = 0;  // its inputs, in ml_segments
@@ -164,18 +168,18 @@ struct MlOperation {
 /// A run of values that an earlier operation computed.
 struct MlSegment {
   std::uint32_t begin = 0, count = 0;  // in operation_values
-  float weight = 1;
+  float weight = 1;                    // factor of the values in a kWeightedSum
 };
 /// A control that an operation reads or writes.
 struct MlControl {
-  std::uint32_t control = 0;
-  float rest = 0;  // what kScatter writes while the mask of the network is 0
+  std::uint32_t control = 0;  // kNone: kScatter writes no control
+  float rest = 0;             // the value that kScatter writes while the mask of the network is 0
 };
 /// A layer of a network: y = activation(W x + b). ml_weights has its b, `rows` values, and then the
 /// columns of W, `rows` values each.
 struct MlLayer {
   std::uint32_t weights_begin = 0, rows = 0, columns = 0;
-  std::uint32_t activation = 0;  // the number that the file uses
+  std::uint32_t activation = 0;  // 1 ReLU, 2 leaky ReLU, 3 tanh, 4 sigmoid; others: none
   float alpha = 0;               // the slope of the leaky ReLU below 0
 };
 
@@ -225,8 +229,8 @@ constexpr std::uint32_t step_index(std::uint32_t step) { return step & 0x3FFFFFF
 /// their dependencies. A *latent* one runs them in the fixed order of the reference evaluator's
 /// stages.
 enum StepList : std::uint32_t {
-  // Networks and solvers that need no corrective. A settled evaluation runs them before all
-  // correctives.
+  // Networks and solvers that need no corrective, directly or indirectly. A settled evaluation runs
+  // them before all correctives.
   kEarly,
   // The other networks and solvers, and the correctives that are not watched (see psds), each after
   // the steps that it reads. A settled evaluation runs all of these steps, a latent one only the
@@ -249,17 +253,17 @@ struct RigHeader {
   // vector. GUI controls do not belong to it.
   std::uint32_t raw_count = 0, gui_count = 0, psd_count = 0, control_count = 0;
   std::uint32_t operation_values = 0;  // floats of scratch memory that operations compute
-  std::uint32_t widest_layer = 0;      // rows of the largest layer of a network
+  std::uint32_t widest_layer = 0;      // largest number of rows or columns of a network layer
   std::uint32_t solver_inputs = 0, solver_poses = 0;  // of the largest solver
   std::uint32_t mask_count = 0;                       // regions of networks
-  // The number of channels at the beginning whose numbers and controls both are consecutive, so
-  // that one copy sets all of them.
+  // The number of entries at the beginning of shape_outputs and shape_inputs whose channels and
+  // controls both are consecutive, so that one copy sets all of these channels.
   std::uint32_t shape_run = 0;
   std::uint32_t joint_stride = 9;  // attributes of a joint; with quaternions 10
   EulerConvention euler;
-  // 1 if networks move joints in other axes than the face's. Then v * ml_basis converts a vector
-  // from the networks' axes to the face's, and ml_euler is the networks' convention of Euler
-  // angles.
+  // 1 if networks move joints in other axes, or with another order or sign of Euler angles, than
+  // the face's. Then v * ml_basis converts a vector from the networks' axes to the face's, and
+  // ml_euler is the networks' convention of Euler angles.
   std::uint32_t ml_converted = 0;
   EulerConvention ml_euler;
   float ml_basis[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -281,10 +285,11 @@ struct RigArrays {
   A<std::uint32_t> gui_range_rows;  // indices into gui_rows
 
   // Correctives. Most of them are 0, and evaluation should not visit these. A corrective is
-  // *watched* if all of its factors have their values before the first corrective is computed. It
-  // is then in the list of one of its factors, the factor with the shortest list. While that factor
-  // is 0 the corrective is 0, and evaluation does not visit it.
-  A<Psd> psds;                    // in the order of their watchers; no two have the same output
+  // *watched* if it has a factor, all of its factors have their values before the first corrective
+  // is computed, and its output is no raw control. It is then in the list of one of its factors,
+  // the factor with the shortest list. While that factor is 0 the corrective is 0, and evaluation
+  // does not visit it.
+  A<Psd> psds;                    // in the order of `watched`, the others last; each output once
   A<std::uint16_t> psd_factors;   // controls
   A<std::uint32_t> watch_begins;  // [LODs, controls + 1]: where each control's list begins
   A<Watch> watched;               // the lists
@@ -315,7 +320,7 @@ struct RigArrays {
   // [LODs, controls + 1]: one entry for each control; the last entry is for all controls together.
   // Empty if a coefficient is not finite, because columns of controls at 0 must not be read then.
   A<ControlReads> control_reads;
-  A<std::uint16_t> joints_written;  // joints that any group moves at any LOD, ascending
+  A<std::uint16_t> joints_written;  // joints that anything moves at any LOD, ascending
 
   // Joints that are rotated by quaternions, and the columns and terms of these rotations.
   A<QuaternionJoint> quaternion_joints;

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Makes, opens and checks a Rig (a compiled face) as one block of bytes: a header, then the arrays
+// of the Rig, each at a multiple of 64 bytes. The header states the sizes, the place of each array
+// and a hash of the bytes.
 #include "rig/block.h"
 
 #include <algorithm>
@@ -37,7 +40,7 @@ struct Place {
 struct BlockHeader {
   char magic[8];
   std::uint32_t byte_order, header_size;
-  std::uint64_t size, hash;  // hash of everything behind it
+  std::uint64_t size, hash;  // bytes of the whole block; XXH64 of everything behind the hash
   RigHeader rig;
   Place places[kArrays];
 };

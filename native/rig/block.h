@@ -30,12 +30,13 @@ struct LateValues {
 /// In:    data     the result of compile(); it is not checked
 ///        kernels  used in every evaluation; they must outlive the rig
 ///        late     writes joint_values if `data` does not have them
-/// Fails: kLimitExceeded (an array with more elements than an index can address)
+/// Fails: kLimitExceeded (an array with more elements than an index can address, or networks that
+///        need more scratch memory than detail::scratch_fits allows)
 core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels,
                            const LateValues& late = {});
 
 /// A Rig from the bytes of Rig::block(). Copies nothing: the bytes stay in the memory of `owner`.
-/// In:    bytes    aligned to 64
+/// In:    bytes    must begin on a multiple of 64 bytes
 ///        check    how much is checked
 ///        kernels  as in make_rig
 /// Fails: kInvalidValue, kInvalidIndex (bytes that are no Rig of this version and machine),

@@ -87,8 +87,8 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   c.below("watched", r.watched, r.control_count, [](const Watch& w) { return w.other; });
   if (!c.status()) return;
   for (const Watch& w : r.watched) c.demand("watched", r.psds[w.psd].output >= r.raw_count);
-  // A corrective must be in at most one list of a LOD, because the list of candidates has one place
-  // for each corrective.
+  // A corrective must be in at most one list of a LOD, because Workspace::firing has one place for
+  // each corrective.
   std::vector<std::uint32_t> seen(r.psds.size(), kNone);
   for (std::uint32_t l = 0; l < r.lod_count; ++l) {
     const std::uint32_t* begins = r.watch_begins.data() + std::size_t{l} * (r.control_count + 1);
@@ -102,7 +102,8 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   }
 }
 
-// Checks group_columns: each entry must be a column of its group with all its rows.
+// Checks group_columns: the values that a kernel reads for a column of the group, its rows rounded
+// up to whole vectors, must be inside the matrices, and its control must exist.
 void check_group_columns(const Rig& r, std::uint64_t values, IndexCheck& c) {
   std::size_t i = 0;
   for (const JointGroup& g : r.joint_groups) {
@@ -132,8 +133,9 @@ void check_groups(const Rig& r, IndexCheck& c) {
   std::uint64_t rows = 0, begin = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const JointGroup& g = r.joint_groups[i];
-    // Rows of groups follow each other without gaps: a kernel writes whole registers, so that it
-    // also overwrites rows of the next group. Only wide groups begin on a vector of their own.
+    // Small groups follow each other without gaps, although a kernel writes whole registers and so
+    // also overwrites the first rows of the next group, which is computed later. Groups of at least
+    // kWidest rows begin at a multiple of kWidest rows.
     const bool wide = g.row_count >= simd::kWidest;
     if (wide) rows = simd::rounded_up(rows);
     c.demand("joint_groups",
@@ -152,7 +154,8 @@ void check_groups(const Rig& r, IndexCheck& c) {
 // The pieces of a LOD may only copy rows that it computes: other rows still have the values of
 // earlier frames.
 void check_live_pieces(const Rig& r, std::uint32_t lod, IndexCheck& c) {
-  std::vector<std::uint32_t> live_before(r.joint_outputs.size() + 1);  // as a running count
+  // [rows + 1]: how many of the rows before each row the LOD computes.
+  std::vector<std::uint32_t> live_before(r.joint_outputs.size() + 1);
   for (std::uint32_t i = 0; i < r.live_groups[lod]; ++i) {
     const std::uint32_t rows = r.joint_group_lods[std::size_t{i} * r.lod_count + lod];
     for (std::uint32_t row = 0; row < rows; ++row) {

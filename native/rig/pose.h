@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Pose: the result of an evaluation. Workspace: its scratch memory.
+// Pose: the result of an evaluation. Workspace: its scratch memory, which also keeps lists of the
+// frame before. A control is active if it is not 0; its columns are its coefficients in the joint
+// groups.
 #pragma once
 
 #include <algorithm>
@@ -37,10 +39,10 @@ inline PoseView view(Pose& pose) {
 
 /// The order in which an evaluation visits the columns of the joint groups.
 enum class Traversal : std::uint8_t {
-  kCounted,  // the order that costs least in the frame, by counted bytes
+  kCounted,  // chooses one of the others in each frame, by counted bytes and columns
   kListed,   // only active controls, whose columns are first listed by group
   kAdded,    // only active controls, in the order of memory; a batch of frames lists them instead
-  kWhole     // all columns, in the order of group_columns, if all coefficients are finite
+  kWhole     // all columns, in the order of group_columns; kListed if a coefficient is not finite
 };
 
 /// The active controls for which a list in a workspace was computed. The list can be used again
@@ -79,48 +81,58 @@ struct alignas(128) Workspace {
   bool warm = false;
   // Correctives.
   KeptControls firing_for;              // the active controls for which firing holds
-  std::vector<std::uint16_t> firing;    // watched correctives that may not be 0; the first
-  std::size_t firing_count = 0;         // firing_count entries are valid
+  std::vector<std::uint16_t> firing;    // watched correctives that can differ from 0, as indices
+  std::size_t firing_count = 0;         // into psds; the first firing_count entries are valid
   bool fires_all = false;               // true: no factor of the listed correctives is 0
   std::vector<std::uint64_t> psd_bits;  // a bit for each corrective control that is not 0
-  std::vector<float> last_controls;     // [controls]: the controls before the correctives ran
+  // [controls]: the values of the controls in a latent evaluation before its correctives run. In a
+  // latent evaluation, each stage reads the results of later stages from the frame before.
+  std::vector<float> last_controls;
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
-  KeptControls listed_for;  // the active controls for which moves and blocks hold
-  // The traversal of the frame in which moves and blocks were computed; after kAdded, columns and
-  // ends are not valid.
+  KeptControls listed_for;  // the active controls for which moves and live_blocks hold
+  // The traversal of the frame in which moves, live_blocks and live were computed; after kAdded,
+  // columns and column_ends are not valid.
   Traversal listed = Traversal::kListed;
-  std::size_t whole_frames = 0;            // evaluations that read all columns
-  std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
-  std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below
+  std::size_t whole_frames = 0;  // evaluations that read all columns
+  std::size_t added_frames = 0;  // evaluations that added columns in the order of memory
+  // [groups]: where the columns of the group end in `columns`, or in Rig::group_columns after
+  // kWhole.
+  std::vector<std::uint32_t> column_ends;
   std::vector<std::uint8_t> moves;         // [groups]: 1 if a group has active columns
   std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
   core::AlignedVector<float> rows;         // the rows of all groups
   core::AlignedVector<float> sums;         // the same, added column by column; 0 between calls
-  std::vector<simd::Rows> group_rows;      // [LODs, groups]: the sums of each group
+  std::vector<simd::Rows> group_rows;      // [LODs, groups]: the group's range of rows in sums
   std::vector<std::uint64_t> live_blocks;  // a bit for each block that an active group writes
   std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
   std::size_t live_count = 0;              // first live_count entries are valid
-  // The live_blocks of the frame before, if the pose belongs to an Instance: nothing else writes to
-  // it, so that all other blocks are 0 already. Empty: the content of the pose is unknown.
+  // The live_blocks of the frame before, if the pose belongs to an Instance in which only joint
+  // groups write joint attributes: all other blocks of the pose are then 0 already. Empty: the
+  // content of the pose is unknown.
   std::vector<std::uint64_t> shown_blocks;
   // Rotations by quaternions.
-  std::vector<std::uint16_t> straight_joints;  // joints that no Euler angles turn at any LOD
-  std::vector<Quaternion> products;            // [quaternion joints]
-  std::vector<std::uint64_t> quaternion_bits;  // a bit for each active column; 0 between calls
+  // If poses have quaternions: the joints that no Euler angles turn at any LOD.
+  std::vector<std::uint16_t> straight_joints;
+  std::vector<Quaternion> products;  // [quaternion joints]
+  // A bit for each column of Rig::quaternion_columns: 1 if the column's control is not 0. All bits
+  // are 0 between two evaluations.
+  std::vector<std::uint64_t> quaternion_bits;
   // Solvers and networks.
-  std::vector<double> solver;  // the inputs of a solver, then two values for each of its poses
-  std::vector<float> masks;    // [regions]: 0 skips the region's networks
+  // The inputs of a solver, then the kernel values of its poses, then the weights of its poses.
+  std::vector<double> solver;
+  std::vector<float> masks;                     // [regions]: 0 skips the region's networks
   core::AlignedVector<float> operation_values;  // results of operations
-  core::AlignedVector<float> layers[2];         // input and output of a network layer
+  core::AlignedVector<float> layers[2];         // input and output of a layer, each with a last 1
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // Memory of evaluate_frames, which evaluates kFrames frames together.
   std::vector<std::uint64_t> union_bits;  // a bit for each control that is not 0 in some frame
-  // [controls, kFrames]: values of the controls. Correctives and networks are 0 between two calls.
+  // [controls, kFrames]: values of the controls. All are 0 between two calls.
   core::AlignedVector<float> frame_weights;
 };
 
-/// Make a pose and a workspace of the sizes that the rig needs.
+/// Make a pose and a workspace of the sizes that the rig needs. All values of the pose are 0; all
+/// masks of the workspace are 1.
 Pose make_pose(const Rig& rig);
 Workspace make_workspace(const Rig& rig);
 /// A workspace for evaluate_frames; evaluate can use it too.

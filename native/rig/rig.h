@@ -26,11 +26,12 @@ class Rig : public RigHeader, public RigArrays<View> {
 
   std::vector<std::string> raw_control_names() const { return texts(0, raw_count); }
   std::vector<std::string> gui_control_names() const { return texts(raw_count, gui_count); }
-  /// Ids of behavior layers of the file that the evaluator does not know.
+  /// Ids of the layers of the file that the reader of DNA files does not know.
   std::vector<std::string> ignored_layers() const {
     return texts(raw_count + gui_count, text_ends.size() - raw_count - gui_count);
   }
-  /// The steps of a list at a LOD, see make_step. In: lod  below the number of LODs
+  /// The steps of a list at a LOD, in the order in which they run, each packed by make_step() of
+  /// arrays.h. In: lod  below the number of LODs
   std::span<const std::uint32_t> steps_of(std::uint32_t lod, StepList list) const {
     const std::uint32_t* begin = step_begins.data() + std::size_t{lod} * kStepLists + list;
     return steps.subspan(begin[0], begin[1] - begin[0]);

@@ -25,9 +25,10 @@ enum class Trust {
 /// Fails: kIoWrite
 core::Status save_rig(const Rig& rig, const std::filesystem::path& path);
 
-/// Opens a Rig from a file of save_rig. Error messages begin with the path.
-/// In:    by  kMap opens a large file without reading it, if its bytes are trusted. Other files are
-///            copied, because anyone who can write to a mapped file can change it after the check.
+/// Opens a Rig from a file of save_rig. Error messages contain the path.
+/// In:    by  kMap maps a file instead of copying it, if its bytes are trusted (kOwner reads it
+///            once for the hash). Other files are copied, because anyone who can write to a mapped
+///            file can change it after the check.
 /// Fails: kIoOpen, kIoRead, and as open_rig
 core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, bytes::ReadBy by,
                                 const simd::Kernels& kernels);

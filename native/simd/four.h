@@ -12,7 +12,8 @@
 
 namespace risorius::simd {
 
-/// Four float32 in one register. If an operand is NaN, the result is NaN.
+/// Four float32, on x86-64 and ARM in one register. If one of them is NaN, its result is NaN, also
+/// of at_least and at_most, whose limit must not be NaN.
 #if defined(__x86_64__) || defined(_M_X64)
 struct Four {
   __m128 v;
@@ -21,7 +22,7 @@ struct Four {
   void store(float* p) const { _mm_storeu_ps(p, v); }
   Four operator*(Four o) const { return {_mm_mul_ps(v, o.v)}; }
   Four operator+(Four o) const { return {_mm_add_ps(v, o.v)}; }
-  // These instructions return the second operand if one is NaN, so that v must be second.
+  // These instructions return the second operand if one is NaN. Therefore v must be second.
   Four at_least(float x) const { return {_mm_max_ps(_mm_set1_ps(x), v)}; }
   Four at_most(float x) const { return {_mm_min_ps(_mm_set1_ps(x), v)}; }
   bool any_but_0() const { return _mm_movemask_ps(_mm_cmpneq_ps(v, _mm_setzero_ps())) != 0; }

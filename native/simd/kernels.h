@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The inner loops of the evaluator and of the file reader: one table of functions per instruction
-// set.
+// Kernels: the inner loops of the evaluator and of the file reader, one table of functions per
+// instruction set. A vector is a CPU register of several floats; a batch is several frames that are
+// evaluated together.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +9,10 @@
 
 namespace risorius::simd {
 
-/// Floats in the widest vector. Kernels round the number of results up to a multiple of kWidest,
-/// and a matrix must have kWidest readable values after its last one: rows are not padded, so that
-/// a kernel also reads values of the next column, and its caller ignores the additional results.
+/// Floats in the widest vector. Kernels compute whole vectors: the columns of a matrix need no
+/// padding, a kernel then also reads the first values of the next column, and its caller ignores
+/// the results behind the last row. Therefore kWidest values after the last one of a matrix must be
+/// readable, and results need room for rounded_up(rows) floats.
 inline constexpr std::size_t kWidest = 16;
 template <class T>
 constexpr T rounded_up(T rows) {
@@ -21,16 +23,17 @@ inline constexpr std::size_t kFrames = 8;
 
 /// A column of a matrix and the index of its weight.
 struct Column {
-  std::uint32_t offset = 0;  // of its first value
+  std::uint32_t offset = 0;  // index of the column's first value among the values of all matrices
   std::uint32_t weight = 0;  // index into the weights
 };
 
 /// A column of a matrix and the index of the rows to which it is added.
 struct Addend {
-  std::uint32_t offset = 0;  // of its first value
-  std::uint32_t group = 0;   // index into the runs
+  std::uint32_t offset = 0;  // index of the column's first value among the values of all matrices
+  std::uint32_t group = 0;   // index into Sums::runs
 };
-/// A run of rows. If count is a multiple of kWidest, columns are added by whole vectors.
+/// A run of rows in Sums::values. If count is a multiple of kWidest, columns are added by whole
+/// vectors.
 struct Rows {
   std::uint32_t begin = 0, count = 0;
 };
@@ -42,27 +45,26 @@ struct Sums {
   std::uint8_t* added = nullptr;  // by group: set to 1 when a column is added
 };
 
-/// Tells which of sixteen attributes are copied. The places with a set bit in mask get consecutive
-/// values, beginning with the value at index `from`.
+/// Tells how values are copied to a block of kPlaces (16) places. Each place p whose bit p of mask
+/// is set, in ascending order, gets the next value, beginning with the value at index `from`.
 struct Piece {
   std::uint32_t from = 0;
   std::uint16_t mask = 0;
-  std::uint16_t block = 0;  // index of the sixteen places; of an extra piece only
+  std::uint16_t block = 0;  // index of the block of places; only place_more reads it
 };
 inline constexpr std::size_t kPlaces = 16;
-/// The addresses of values and places of the first frame, the strides to the next frames, and the
-/// number of frames.
+/// The arrays between which `place` copies floats, for several frames.
 struct PlacedFrames {
-  const float* from;
-  std::size_t from_stride;
-  float* to;
-  std::size_t to_stride;
-  std::size_t count;
+  const float* from;        // the values of the first frame
+  std::size_t from_stride;  // floats from the values of a frame to the next frame's
+  float* to;                // the places of the first frame
+  std::size_t to_stride;    // floats from the places of a frame to the next frame's
+  std::size_t count;        // number of frames
 };
 
-/// A convention of Euler angles. order: the axis of each rotation; half_units: for each rotation
-/// half a unit of its angle in radians, with the sign of its direction; parity: +1 for the cyclic
-/// orders xyz, yzx, zxy, -1 for the others.
+/// A convention of Euler angles. order: the axes in the order of rotation; half_units: for each
+/// rotation, in the same order, the factor from its angle to half of the angle in radians, negative
+/// if the direction is reversed; parity: +1 for the cyclic orders xyz, yzx, zxy, -1 for the others.
 struct EulerTurns {
   std::uint8_t order[3] = {0, 1, 2};
   float half_units[3] = {0.5f, 0.5f, 0.5f};
@@ -80,17 +82,19 @@ inline constexpr std::size_t kSkinGroup = 4;
 inline constexpr std::size_t kSkinRow = 16;
 /// Some vertices of a skin, run after run. Each group of a run first lists four influences of its
 /// first vertex, then four of its second, and so on, then the next four of each vertex. Missing
-/// influences have weight 0 and a bone whose row is 0.
+/// influences, also those of the missing vertices of a smaller group, have weight 0 and a bone
+/// whose row is 0. Runs with `fours` 0 have no influences.
 struct SkinPart {
   const SkinRun* runs = nullptr;
   std::size_t run_count = 0;
   const std::uint16_t* vertices = nullptr;  // index of each vertex's point, ascending in a run
-  const std::uint16_t* bones = nullptr;
-  const float* weights = nullptr;
+  const std::uint16_t* bones = nullptr;     // of each influence: index of the bone's row
+  const float* weights = nullptr;           // of each influence
 };
 
-/// Columns per group below which add_columns in the order of memory is the fastest way; with more
-/// columns, `columns` with a list is faster. Measured for each instruction set.
+/// Average number of columns per group of rows below which add_columns in the order of memory is
+/// the fastest way; with more columns, `columns` with a list is faster. Measured for each
+/// instruction set, for matrices of float32 (floats) and float16 (halves).
 struct FewColumns {
   static constexpr std::uint32_t kAny = 0xffffffff;  // add_columns is always used
   std::uint32_t floats = kAny, halves = 64;
@@ -102,8 +106,9 @@ struct Kernels {
   const char* name;
 
   /// out[r] = sum over i of weights[columns[i].weight] * values[columns[i].offset + r].
-  /// In:   values   of all matrices
+  /// In:   values   float32, the values of all matrices
   ///       n        number of columns
+  ///       weights  float32, in which Column::weight is an index
   /// Out:  out      float32[rounded_up(rows)], overwritten; values after `rows` are undefined
   void (*columns)(const float* values, const Column* columns, std::size_t n, const float* weights,
                   float* out, std::size_t rows);
@@ -111,29 +116,31 @@ struct Kernels {
   void (*half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
                        const float* weights, float* out, std::size_t rows);
   /// sums.values[begin + r] += weight * values[offset + r] for each row r of a column's run of
-  /// rows. Columns are added one after the other, up to the first column of a group without rows.
-  /// Other sums do not change.
-  /// In: columns  by ascending group
+  /// rows, where begin is Rows::begin. Columns are added one after the other, up to the first
+  /// column whose group is not below sums.groups. Other sums do not change.
+  /// In: columns  sorted by ascending group
   void (*add_columns)(const float* values, const Addend* columns, std::size_t n, float weight,
                       const Sums& sums);
   void (*add_half_columns)(const std::uint16_t* values, const Addend* columns, std::size_t n,
                            float weight, const Sums& sums);
-  /// Like columns, for kFrames frames: weights float32[.., kFrames], frame f at out + f * stride.
+  /// Like columns, for kFrames frames: weights are float32[.., kFrames], and the results of frame f
+  /// begin at out + f * stride.
   void (*batch_columns)(const float* values, const Column* columns, std::size_t n,
                         const float* weights, float* out, std::size_t stride, std::size_t rows);
   void (*batch_half_columns)(const std::uint16_t* values, const Column* columns, std::size_t n,
                              const float* weights, float* out, std::size_t stride,
                              std::size_t rows);
-  /// Fills n blocks of kPlaces attributes in each frame: places of the block's piece get values,
-  /// all others get 0.
-  /// In: from  kPlaces values are readable from the first value of any piece on
+  /// Fills n consecutive blocks of kPlaces places in each frame, block i as pieces[i] tells: places
+  /// whose bit is set in the mask get values, all others get 0.
+  /// In: frames.from  kPlaces values are readable from the first value of any piece on
   void (*place)(const Piece* pieces, std::size_t n, const PlacedFrames& frames);
-  /// Like place for extra pieces: the other places of their blocks keep their values, but may be
-  /// read and rewritten.
+  /// Like place, but piece i goes to block pieces[i].block, and the places whose bit is not set
+  /// keep their values; they may be read and rewritten.
   void (*place_more)(const Piece* pieces, std::size_t n, const PlacedFrames& frames);
   /// Converts Euler angles x y z to quaternions x y z w in place, with an error below 2e-7 and the
-  /// same bits on every CPU.
-  /// In:   which      n indices of rotations
+  /// same bits on every CPU. Half angles above 8,192 radians use the C library's sine and cosine,
+  /// whose bits may differ between systems.
+  /// In:   which      n different indices of rotations
   ///       rotations  the angles of rotation i are at i * stride, followed by room for w
   void (*quaternions)(const EulerTurns& turns, const std::uint16_t* which, std::size_t n,
                       float* rotations, std::size_t stride);
@@ -147,7 +154,8 @@ struct Kernels {
   /// move. Influences are added in their order, for each vertex independently.
   /// In:  rows    from skin_rows, aligned to a cache line
   ///      points  float32[.., 3]
-  /// Out: out     float32[.., 3]: only the vertices of the part are written; may be points
+  /// Out: out     float32[.., 3]: only the vertices of the part are written; may be the same array
+  ///              as points
   void (*skin)(const float* rows, const SkinPart& part, const float* points, float* out);
 
   /// Converts n big-endian numbers of a file to the machine's byte order.
@@ -165,8 +173,8 @@ struct Kernels {
 /// Functions in plain C++ without fused operations and with a fixed order of sums: the bits are the
 /// same on every machine.
 const Kernels& scalar_kernels();
-/// Null if the build or the CPU does not have the instructions. SSE4 gives the same bits as the
-/// scalar functions.
+/// Each of these four functions returns null if the build or the CPU does not have the
+/// instructions. SSE4 gives the same bits as the scalar functions.
 const Kernels* sse4_kernels();
 const Kernels* avx2_kernels();    // with FMA and F16C
 const Kernels* avx512_kernels();  // F, BW, DQ, VL
@@ -179,10 +187,11 @@ bool cpu_has_avx512();  // F, BW, DQ, VL
 
 /// The table with a name ("scalar", "sse4", "avx2", "avx512", "neon"); null if this CPU does not
 /// support it or no table has the name. An empty name or null means the name in the environment
-/// variable RISORIUS_SIMD if it is set, otherwise the best table that this CPU supports.
+/// variable RISORIUS_SIMD if it is set and not empty, otherwise the best table that this CPU
+/// supports.
 const Kernels* find_kernels(const char* name);
-/// Like find_kernels(""), but returns the scalar table if RISORIUS_SIMD names a table that this CPU
-/// does not support. For callers that cannot report an error.
+/// Like find_kernels(""), but returns the scalar table if RISORIUS_SIMD has an unknown name or
+/// names a table that this CPU does not support. For callers that cannot report an error.
 const Kernels& usual_kernels();
 /// The names of the tables that this CPU supports, for an error message: "scalar, sse4, avx2".
 const char* available_kernels();

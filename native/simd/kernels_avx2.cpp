@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// The kernels for AVX2 with FMA and F16C: instructions for the loops of kernels_body.h and
+// skin_body.h, on registers of eight floats, one in each lane. A piece copies consecutive values to
+// the places of a block of 16 places whose bit is set in the mask of the piece.
 #include <array>
 #include <bit>
 
@@ -21,8 +24,8 @@ namespace risorius::simd {
 namespace {
 
 // For each mask of eight places, an entry for each place: the index of the value that the place
-// gets, with bit 7 set, or 0. The shuffle uses only the lowest three bits, the blend only the
-// highest.
+// gets, with bit 7 set, or 0 if the place gets none. The shuffle uses only the lowest three bits,
+// the blend only the highest.
 constexpr auto kExpandOrders = [] {
   std::array<std::array<std::uint8_t, 8>, 256> orders{};
   for (std::size_t mask = 0; mask < 256; ++mask) {
@@ -63,7 +66,8 @@ struct ColumnsByTwo {
     _mm_storel_pi(reinterpret_cast<__m64*>(out), moved);
     _mm_store_ss(out + 2, _mm_movehl_ps(moved, moved));
   }
-  // Products of the columns with the coordinates of a point, added in pairs.
+  // Products of the matrix's columns with the coordinates x y z 1 of a point: column 0 * x + column
+  // 2 * z in the lower half, column 1 * y + column 3 in the upper half.
   // In: numbers  four numbers, of which three from kFirst on are the point
   template <int kFirst>
   RISORIUS_INLINE static __m256 products(const Sum& sum, const float* numbers) {
@@ -74,7 +78,7 @@ struct ColumnsByTwo {
                      _mm256_blend_ps(_mm256_permute_ps(both, z * 0x55), _mm256_set1_ps(1.0f), 0xF0);
     return _mm256_fmadd_ps(sum.c[0], first, _mm256_mul_ps(sum.c[1], second));
   }
-  // Writes four consecutive vertices.
+  // Writes the moved points of four consecutive vertices, 12 floats.
   RISORIUS_INLINE static void finish_four(const Sum* sums, const float* points, float* out) {
     const __m256 a = products<0>(sums[0], points), b = products<0>(sums[1], points + 3),
                  c = products<0>(sums[2], points + 6), d = products<1>(sums[3], points + 8);
@@ -117,8 +121,8 @@ struct V {
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm256_storeu_ps(p, v); }
   RISORIUS_INLINE static Reg madd(Reg a, Reg b, Reg sum) { return _mm256_fmadd_ps(a, b, sum); }
-  // For eight places: the value that each place gets, the index of the first value, and whether any
-  // place gets one.
+  // Half of a piece, eight places. order: an entry of kExpandOrders; from: the number of the
+  // piece's values that go to earlier places; any: whether a place of this half gets a value.
   struct Half {
     __m256i order;
     std::size_t from;

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// The kernels for AVX-512: instructions for the loops of kernels_body.h, rotations_body.h and
+// skin_body.h, on registers of 16 floats, one in each lane. A piece copies consecutive values to
+// the places of a block of 16 places whose bit is set in the mask of the piece.
 #include "simd/kernels.h"
 
 #if defined(__x86_64__) || defined(_M_X64)
@@ -17,9 +20,11 @@ namespace risorius::simd {
 
 namespace {
 
-// Converts sixteen rotations together, four in a register. The function for the sines then loads
-// exactly these registers; loads that span two stores of half a register would have to wait for
-// both. The number after each rotation is read and written with it.
+// Copies Euler angles from memory to an array for each axis (split) and quaternion components back
+// (join), like OneByOne of rotations_body.h, but sixteen rotations together, four in a register.
+// The function for the sines then loads exactly these registers; loads that span two stores of half
+// a register would have to wait for both. split also reads the float after the three angles, where
+// join writes w.
 struct SixteenByFour {
   static_assert(kTurns == 16);
   // Intrinsics with masks are used, because gcc 12 warns about reads of unset values in intrinsics
@@ -62,7 +67,8 @@ struct SixteenByFour {
       _mm_storeu_ps(rotations + at[i + 12], _mm512_maskz_extractf32x4_ps(kFour, r[i], 3));
     }
   }
-  // Like OneByOne::any_beyond, but one instruction combines the sign bits.
+  // Whether an angle exceeds a positive limit (given by its bits), or is infinite or NaN, as in
+  // OneByOne::any_beyond, but one instruction collects the sign bits of all lanes.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m512i most = _mm512_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm512_set1_epi32(0x7FFFFFFF);
@@ -112,7 +118,8 @@ struct AllColumns {
         _mm_add_ps(_mm256_castps256_ps128(two), _mm256_maskz_extractf32x4_ps(kFour, two, 1));
     _mm_mask_storeu_ps(out, kThree, _mm_add_ps(p, one));
   }
-  // Products of the columns with the coordinates of a point.
+  // Products of the matrix's columns with the coordinates x y z 1 of point kVertex, one column in
+  // each quarter.
   // In: four  the twelve coordinates of four points, then 1
   template <int kVertex>
   RISORIUS_INLINE static __m512 products(const Sum& sum, __m512 four) {
@@ -120,13 +127,14 @@ struct AllColumns {
     const __m512i column = _mm512_setr_epi32(x, x, x, x, y, y, y, y, z, z, z, z, w, w, w, w);
     return _mm512_mul_ps(sum.whole(), _mm512_maskz_permutexvar_ps(kAll, column, four));
   }
-  // For each of two vertices a and b: first plus third quarter, second plus fourth quarter.
+  // The four quarters of the result: a's first plus a's third quarter, a's second plus a's fourth,
+  // and the same two sums of b.
   RISORIUS_INLINE static __m512 halves(__m512 a, __m512 b) {
     return _mm512_add_ps(_mm512_maskz_shuffle_f32x4(kAll, a, b, 0x44),
                          _mm512_maskz_shuffle_f32x4(kAll, a, b, 0xEE));
   }
-  // Writes four consecutive vertices. A masked read is slower than two reads; a masked write is not
-  // slower.
+  // Writes the moved points of four consecutive vertices, 12 floats. A masked read would be slower
+  // than the two reads; a masked write is not slower.
   RISORIUS_INLINE static void finish_four(const Sum* sums, const float* points, float* out) {
     const __m256 last = _mm256_insertf128_ps(_mm256_set1_ps(1.0f), _mm_loadu_ps(points + 8), 0);
     const __m512 first = _mm512_maskz_broadcast_f32x8(kAll, _mm256_loadu_ps(points));

@@ -3,9 +3,12 @@
 // defines RISORIUS_TARGET (the functions' target attribute: in a file compiled with -mavx2 the
 // linker could pick an inline standard function that older CPUs cannot run) and V with
 //   Reg, kLanes, zero(), set(float), load(const float*), load(const uint16_t*), store(float*, Reg),
-//   madd(a, b, sum), order(mask), expand(from, order, to) and expand_more (kernels.h, place),
-//   optionally orders(mask) for many frames; kBlocks and kBatchBlocks: registers of rows at once;
-//   kBatchFrames; Parts: like OneByOne of rotations_body.h; Skin: like S of skin_body.h.
+//   madd(a, b, sum): sum + a * b, order(mask): a decoded Piece::mask, expand(from, order, to) and
+//   expand_more(from, order, to): `place` and `place_more` of kernels.h for one piece, optionally
+//   orders(mask): another decoded form, faster if many frames use it; kBlocks and kBatchBlocks:
+//   most registers of rows that one call of block() or batch_block() sums; kBatchFrames: frames
+//   that one call of batch_block() computes; Parts: like OneByOne of rotations_body.h; Skin: like S
+//   of skin_body.h.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,8 +23,8 @@ namespace risorius::simd {
 
 namespace {
 
-// The sums of kRow registers of rows for each of some frames. The loops are unrolled by templates,
-// because gcc 12 keeps sums of a loop in memory.
+// The sums of some frames: sums[f][r] is register r of the rows of frame f. The loops are unrolled
+// by templates, because gcc 12 keeps sums of a loop in memory.
 template <class Frames, class Rows>
 struct BlockSums;
 template <std::size_t... kFrame, std::size_t... kRow>
@@ -81,8 +84,8 @@ constexpr auto batch_block_table(std::integer_sequence<int, kCounts...>) {
   return std::array{&batch_block<kCounts + 1, T>...};
 }
 
-// Divides the rows into the smallest number of blocks of about equal size, and calls f(first
-// register, number of registers) for each.
+// Divides the registers of the rows into the smallest number of blocks of at most `most` registers
+// and about equal size, and calls f(first register, number of registers) for each block.
 template <class F>
 void for_blocks(std::size_t rows, std::size_t most, F f) {
   const std::size_t all = (rows + V::kLanes - 1) / V::kLanes, blocks = (all + most - 1) / most;
@@ -152,7 +155,8 @@ RISORIUS_INLINE auto order_of(std::uint32_t mask) {
   }
 }
 
-// Places the pieces in all frames. Each mask is decoded only once.
+// Places the pieces in all frames. Each mask is decoded only once. kMore: true as place_more, false
+// as place of kernels.h; kMany: there are several frames.
 template <bool kMore, bool kMany>
 RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames frames) {
   for (std::size_t i = 0; i < n; ++i) {

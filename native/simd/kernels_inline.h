@@ -16,8 +16,9 @@
 
 namespace risorius::simd {
 
-/// For each mask of four places: the bytes of the values that each place gets, 0x80 (which gives 0)
-/// for a place without a value. For instruction sets that shuffle bytes by a table.
+/// Tables for byte shuffles that spread packed floats over the set bits of a mask of four bits: the
+/// first float goes to the lowest set bit, the next one to the next set bit, other places get 0.
+/// kExpandBytes[mask]: for each byte of the result the index of the byte to copy; 0x80 gives 0.
 inline constexpr auto kExpandBytes = [] {
   std::array<std::array<std::uint8_t, 16>, 16> orders{};
   for (std::size_t mask = 0; mask < 16; ++mask) {

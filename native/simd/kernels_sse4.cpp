@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// The kernels for SSE4.1: instructions for the loops of kernels_body.h, rotations_body.h and
+// skin_body.h, on registers of four floats, one in each lane. The results have the same bits as the
+// results of the scalar kernels.
 #include <bit>
 
 #include "simd/kernels.h"
@@ -19,7 +22,9 @@ namespace risorius::simd {
 
 namespace {
 
-// Converts four rotations together. The number after each rotation is read and written with it.
+// Copies Euler angles from memory to an array for each axis (split) and quaternion components back
+// (join), like OneByOne of rotations_body.h, but four rotations together. split also reads the
+// float after the three angles, where join writes w.
 struct FourByFour {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
                                     Turns (&angles)[3]) {
@@ -39,7 +44,8 @@ struct FourByFour {
       for (std::size_t i = 0; i < 4; ++i) _mm_storeu_ps(rotations + at[l + i], r[i]);
     }
   }
-  // Like OneByOne::any_beyond, but one instruction combines the sign bits.
+  // Whether an angle exceeds a positive limit (given by its bits), or is infinite or NaN, as in
+  // OneByOne::any_beyond, but one instruction collects the sign bits of all lanes.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m128i most = _mm_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm_set1_epi32(0x7FFFFFFF);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Splits rotations into arrays of their parts and joins them again, with AVX2. Include it after
-// RISORIUS_TARGET.
+// Splits Euler angles into one array for each axis, and joins arrays of quaternion components, with
+// AVX2. Include it after RISORIUS_TARGET.
 #pragma once
 
 #include <immintrin.h>
@@ -15,10 +15,10 @@ namespace risorius::simd {
 
 namespace {
 
-// Converts eight rotations together; the registers have the fifth to eighth in their upper halves.
-// The function for the sines then loads exactly these registers; loads that span two stores of half
-// a register would have to wait for both. The number after each rotation is read and written with
-// it.
+// Like OneByOne of rotations_body.h, but copies eight rotations together; the registers have the
+// fifth to eighth in their upper halves. The function for the sines then loads exactly these
+// registers; loads that span two stores of half a register would have to wait for both. split also
+// reads the float after the three angles, where join writes w.
 struct EightByFour {
   // Transposes the registers in each half: lane i of r[k] becomes lane k of r[i].
   RISORIUS_INLINE static void transpose(__m256 (&r)[4]) {
@@ -54,7 +54,8 @@ struct EightByFour {
       }
     }
   }
-  // Like OneByOne::any_beyond, but one instruction combines the sign bits.
+  // Whether an angle exceeds a positive limit (given by its bits), or is infinite or NaN, as in
+  // OneByOne::any_beyond, but one instruction collects the sign bits of all lanes.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m256i most = _mm256_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm256_set1_epi32(0x7FFFFFFF);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Converts Euler angles to quaternions, compiled once for each instruction set. Loops have constant
 // counts, so that the compiler vectorises them under RISORIUS_TARGET. The bits are the same on
-// every CPU.
+// every CPU, except for half angles above kReduced.
 #pragma once
 
 #include <bit>
@@ -18,8 +18,8 @@ namespace risorius::simd {
 
 namespace {
 
-constexpr std::size_t kTurns = 16;
-using Turns = float[kTurns];
+constexpr std::size_t kTurns = 16;  // rotations that are converted together
+using Turns = float[kTurns];        // one angle or quaternion component of each of them
 // The angles about all three axes are in one array, because one loop over all of them is faster
 // than three loops: the CPU computes more sines in parallel.
 constexpr std::size_t kAngles = 3 * kTurns;
@@ -35,7 +35,8 @@ RISORIUS_INLINE float near_cosine(float z) {
          z * z * (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f));
 }
 
-// Sine and cosine of any angles in radians, reduced by quarter turns; error below 1e-7.
+// Sine and cosine of angles in radians, reduced by quarter turns. The error is below 1e-7 for
+// angles up to kReduced; repair() replaces the results of larger angles.
 RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   constexpr float kRound = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer
   for (std::size_t l = 0; l < kAngles; ++l) {
@@ -50,8 +51,8 @@ RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cos
     cosines[l] = std::bit_cast<float>(((cb & ~swap) | (sb & swap)) ^ (((n + 1u) & 2u) << 30));
   }
 }
-// As sine_and_cosine, for angles that need no reduction: the same bits in half the time. Faces
-// rarely rotate a joint so far that an angle needs a reduction.
+// As sine_and_cosine, for angles of at most kNear, which need no reduction: the same bits in half
+// the time. Faces rarely rotate a joint so far that an angle needs a reduction.
 RISORIUS_INLINE void near_sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   for (std::size_t l = 0; l < kAngles; ++l) {
     const float z = x[l] * x[l];
@@ -60,8 +61,9 @@ RISORIUS_INLINE void near_sine_and_cosine(const Angles& x, Angles& sines, Angles
   }
 }
 
-constexpr float kNear = 0.785f;      // slightly less than an eighth of a turn
-constexpr float kReduced = 8192.0f;  // largest angle for which the reduction is exact enough
+constexpr float kNear = 0.785f;      // radians, slightly less than an eighth of a turn
+constexpr float kReduced = 8192.0f;  // radians, largest angle that is reduced exactly enough
+// Replaces the results of angles above kReduced, infinity and NaN by the C library's.
 void repair(const Angles& x, Angles& sines, Angles& cosines) {
   for (std::size_t l = 0; l < kAngles; ++l) {
     if (std::fabs(x[l]) <= kReduced) continue;
@@ -70,7 +72,10 @@ void repair(const Angles& x, Angles& sines, Angles& cosines) {
   }
 }
 
-// Converts half angles, in the order of rotation, to quaternions x y z w.
+// Converts half angles to quaternions.
+// In:  half  radians: of the first rotation of all quaternions, then of the second, then the third
+// Out: q     q[0] to q[2] are the components for the axes of the three rotations, in the order of
+//            rotation, q[3] is w
 template <class Parts>
 RISORIUS_INLINE void turn(float parity, const Angles& half, Turns (&q)[4]) {
   alignas(64) Angles sines, cosines;
@@ -93,7 +98,8 @@ RISORIUS_INLINE void turn(float parity, const Angles& half, Turns (&q)[4]) {
   }
 }
 
-// Copies kTurns rotations from memory into one array for each of their components, and back.
+// split copies the angles of kTurns rotations from memory into one array for each axis; join copies
+// four arrays of quaternion components back to the same places.
 // In: at  the offset of each rotation
 struct OneByOne {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
@@ -147,14 +153,14 @@ RISORIUS_INLINE bool turns(const float* angles) {
   return (two | third) != 0;
 }
 
-// Collects the rotations that are not 0, and writes quaternions of no rotation for the others. A
-// batch of sixteen is computed only when 32 more have been collected, because it would otherwise
-// have to wait for the stores just before.
+// Lists in `turning` the rotations that are not 0, and writes quaternions of no rotation for the
+// others. A batch of sixteen is computed only when 32 more have been listed, because the CPU would
+// otherwise have to wait for the entries of the list that it has just written.
 template <class Parts>
 RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which, std::size_t n,
                                  float* rotations, std::size_t stride) {
   constexpr std::size_t kBehind = 3 * kTurns;
-  std::uint32_t turning[17 * kTurns];  // offsets of the gathered rotations
+  std::uint32_t turning[17 * kTurns];  // offsets of the listed rotations
   std::size_t count = 0, done = 0;
   float elsewhere = 0;
   for (std::size_t i = 0; i < n; i += kTurns) {
@@ -162,8 +168,8 @@ RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which
     for (std::size_t j = i; j < end; ++j) {
       const std::size_t at = which[j] * stride;
       const bool moves = turns(rotations + at);
-      // The w of a collected rotation is written later, so that this store goes to an unused
-      // number.
+      // If the rotation is not 0, turn_together writes its w later. The store below then goes to
+      // `elsewhere`, which nothing reads.
       float* w = moves ? &elsewhere : rotations + at + 3;
       *w = 1.0f;
       turning[count] = static_cast<std::uint32_t>(at);

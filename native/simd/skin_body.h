@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The skinning kernel over a type S, compiled once for each instruction set. S has
-//   Sum: the blended matrices of a vertex; zero(); kTogether: number of vertices at once, 1, 2 or
-//   4, so that no addition waits for the one before; Weights, weights(const float*): four of them;
-//   add<i>(sum, weights, row): adds weight i times a row; finish(sum, point, out), and optionally
-//   finish_four(sums, points, out) for consecutive vertices; pack(matrix, row): see skin_rows.
+//   Sum: the weighted sum of a vertex's matrices; zero(): an empty Sum; kTogether: number of
+//   vertices whose influences are added in turn, 1, 2 or 4, so that no addition waits for the one
+//   before; Weights, weights(const float*): loads four weights; add<i>(sum, weights, row): adds
+//   weight i times a row; finish(sum, point, out): writes point + sum * point, and optionally
+//   finish_four(sums, points, out): the same for four consecutive vertices; pack(matrix, row):
+//   writes a bone's matrix minus the identity as a row of skin_rows (kernels.h).
 // Include it after RISORIUS_TARGET.
 #pragma once
 
@@ -38,7 +40,7 @@ RISORIUS_INLINE void add_four(typename S::Sum& sum, const float* rows, const std
   }
 }
 
-// Adds all influences of kVertex vertices of a group.
+// Computes the sums of all influences of sizeof...(kVertex) neighbouring vertices of a group.
 // In: fours  number of influences of each vertex, divided by four
 template <class S, std::size_t... kVertex>
 RISORIUS_INLINE void add_all(typename S::Sum* sums, const float* rows, const std::uint16_t* bones,

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Least squares with bounds on the unknowns: least_change() solves the dual problem, which has one
+// unknown for each row, and descend() minimises a quadratic function by coordinate descent with
+// Newton steps.
 #include "solve/bounded.h"
 
 #include <algorithm>
@@ -8,9 +11,9 @@ namespace risorius::solve {
 
 namespace {
 
-/// Solves m x = b for a symmetric positive definite m [n, n], which is overwritten. A direction
-/// whose pivot is 0 or, by rounding, negative gets the value 0. In: x  the right side b. Out: x
-/// the solution
+/// Solves m x = b for a symmetric positive definite m [n, n], of which only the lower triangle is
+/// read, and which is overwritten. An unknown whose pivot is 0 or, by rounding, negative gets the
+/// value 0. In: x  the right side b. Out: x  the solution
 void solve_symmetric(std::size_t n, double* m, double* x) {
   for (std::size_t j = 0; j < n; ++j) {
     double* row = m + j * n;
@@ -47,7 +50,8 @@ struct Dual {
   const double *a, *b, *low, *high;
   double ridge;
 
-  /// Out: x  the solution that belongs to y; slope  y + a x - b, the gradient of value()
+  /// Computes x(y) = clip(a^T y / ridge, low, high).
+  /// Out: x  x(y); slope  y + a x - b, the gradient of value()
   void image(const std::vector<double>& y, double* x, std::vector<double>& slope) const {
     std::fill(x, x + columns, 0.0);
     for (std::size_t r = 0; r < rows; ++r) {
@@ -71,7 +75,7 @@ struct Dual {
     }
     return sum;
   }
-  /// A Newton step at the point where image() gave x and slope.
+  /// A Newton step, the change of y, at the y for which image() gave x and slope.
   std::vector<double> step(const double* x, const std::vector<double>& slope) const {
     std::vector<double> m(rows * rows), out(rows);
     for (std::size_t c = 0; c < columns; ++c) {
@@ -123,8 +127,9 @@ struct Descent {
     }
     return largest;
   }
-  /// A Newton step in the free coordinates: coordinates strictly between their bounds and different
-  /// from `rest`. The step is shortened so that no coordinate crosses a bound or its `rest` value.
+  /// A Newton step in the free coordinates: coordinates strictly between their bounds, except those
+  /// at `rest` with a sparse cost. The step is shortened so that no coordinate crosses a bound, or
+  /// its `rest` value if it has a sparse cost.
   void newton() {
     std::vector<std::size_t> loose;
     for (std::size_t i = 0; i < q.count; ++i) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Least squares with bounds.
+// Least squares with bounds on the unknowns, such as raw controls that bring points of a skin to
+// goals.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +18,7 @@ namespace risorius::solve {
 /// x(y) - b, the gradient of a convex function. The zero is found by Newton's method with step
 /// halving.
 /// In:  a [rows, columns], b [rows], low <= high [columns]; all finite; ridge above 0
-/// Out: x [columns], the solution
+/// Out: x [columns], the solution; after 100 Newton steps the last approximation
 void least_change(std::size_t rows, std::size_t columns, const double* a, const double* b,
                   const double* low, const double* high, double ridge, double* x);
 
@@ -27,14 +28,15 @@ struct Quadratic {
   std::size_t count = 0;
   const double* h = nullptr;  // [count, count], symmetric, positive semidefinite
   const double* g = nullptr;  // [count]
-  const double *low = nullptr, *high = nullptr, *rest = nullptr;
-  const double* sparse = nullptr;  // 0 or more
+  const double *low = nullptr, *high = nullptr, *rest = nullptr;  // [count] each
+  const double* sparse = nullptr;                                 // [count], 0 or more
 };
 /// Minimises the function by coordinate descent, with Newton steps in the coordinates that are not
 /// at a bound.
 /// In:  x          [count], a start between the bounds
-///      tolerance  the descent ends when no coordinate changes by more
-/// Out: x          the minimum
+///      tolerance  after the first Newton step the descent ends as soon as a pass over all
+///                 coordinates changes none by more than this, or after 60 Newton steps
+/// Out: x          the minimum, or the approximation after 60 Newton steps
 void descend(const Quadratic& q, double tolerance, double* x);
 
 /// Computes the normal matrix. Out: h [controls, controls] = J^T J

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Computes positions of points of a skin, and their derivatives by raw controls as difference
+// quotients: each control is moved a little from a base pose, and only the points that this moves
+// are skinned again.
 #include "solve/probe.h"
 
 #include <algorithm>
@@ -14,8 +17,11 @@ constexpr std::uint32_t kUnused = 0xFFFFFFFFu;
 
 /// Inverts lists: from the things that each point uses to the points that use each thing,
 /// ascending. A thing is a joint or a channel.
-/// In:  begins, things  the things that each point uses
+/// In:  begins, things  the things of point p are things[begins[p]] up to things[begins[p + 1]]
+///      count           number of joints or channels
+///      thing           thing(t): the index of the joint or channel of an element of things
 /// Out: user_begins     [count + 1] into users
+///      users           the indices of the points
 template <class T, class F>
 void invert(const std::vector<std::uint32_t>& begins, const std::vector<T>& things,
             std::size_t count, F thing, std::vector<std::uint32_t>& user_begins,
@@ -147,8 +153,9 @@ void Probe::mark(std::span<const std::uint32_t> users) {
   }
 }
 
-// Copies the values in which a frame differs from the base pose, and marks the points that depend
-// on these values.
+// Finds the joints and channels in which a frame of the last evaluation differs from the base pose,
+// writes their matrices and weights to other_world_, other_skin_ and other_weights_, and marks the
+// points that they move. A joint also differs if its parent does.
 void Probe::changed(std::size_t frame) {
   const rig::Rig& rig = *surface_.rig;
   const float* joints = joint_values_.data() + frame * rig.joint_count * 9;

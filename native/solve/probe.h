@@ -19,12 +19,14 @@ struct Point {
   std::uint32_t mesh, vertex;
 };
 
-/// The step of a control for a difference quotient. The rig's numbers are float32, so that a
-/// derivative has an error of about 2^-24 / kStep of the largest value.
+/// The step of a control for a difference quotient. The rig computes in float32, so that the
+/// rounding error of a derivative is about 2^-24 / kStep = 2^-16 times the largest rounded number.
 inline constexpr double kStep = 1.0 / 256;
 
-/// The Jacobian, in blocks of kBlock neighbouring points. A block lists the controls that move any
-/// of its points, each with kBlock * 3 numbers.
+/// The Jacobian of point positions, in blocks of kBlock points that follow each other in the list
+/// of points. A block lists the controls that move any of its points, each with kBlock * 3 numbers;
+/// in the last block the numbers of missing points are 0. `controls` counts all raw controls of the
+/// rig, `points` all points.
 struct Jacobian {
   static constexpr std::size_t kBlock = 32;
   struct Block {
@@ -44,13 +46,14 @@ class Probe {
 
   std::size_t size() const { return points_.size(); }
   /// Computes the positions of the points in a pose.
-  /// In:  raw  float32[R], the raw controls of the pose
+  /// In:  raw  float32[raw controls], the pose
   /// Out: out  float64[points, 3], file units
   void positions(const float* raw, double* out);
   /// Computes the derivatives of the positions.
-  /// In: raw   float32[R], the pose
-  ///     high  float32[R]: a control whose step would exceed it is moved down instead
-  ///     free  [R]: controls with 0 get no column
+  /// In: raw   float32[raw controls], the pose
+  ///     high  float32[raw controls]: a control that a step up would move above this value is moved
+  ///           down instead
+  ///     free  [raw controls]: a control whose value here is 0 gets no column
   Jacobian jacobian(const float* raw, const float* high, const std::uint8_t* free);
 
  private:
@@ -76,7 +79,8 @@ class Probe {
   std::vector<std::uint32_t> influence_begins_, shape_begins_;  // [points + 1]
   std::vector<Influence> influences_;                           // joint: index in joints_
   std::vector<Shape> shapes_;                                   // channel: index in channels_
-  // The points that each joint and each channel moves.
+  // The points that each joint of joints_ and each channel of channels_ moves. The lists "begins"
+  // have a last entry for the end.
   std::vector<std::uint32_t> joint_users_begins_, joint_users_, channel_users_begins_,
       channel_users_;
 
@@ -85,13 +89,13 @@ class Probe {
   std::vector<float> weights_;  // [channels_]
   std::vector<Matrix> world_, skin_;
   std::vector<std::array<double, 3>> base_;  // [points_]
-  // The pose with one control moved.
+  // The pose with one control moved; equal to the base pose between two columns.
   std::vector<Matrix> other_world_, other_skin_;
   std::vector<float> other_weights_;
-  std::vector<std::uint8_t> moved_;      // [joints_]
+  std::vector<std::uint8_t> moved_;      // [joints_]: 1 if the joint differs from the base pose
   std::vector<std::uint32_t> marked_;    // points
   std::vector<std::uint8_t> is_marked_;  // [points_]
-  // Evaluations.
+  // Memory of the rig's evaluations: inputs and outputs of kFrames frames.
   rig::Workspace work_;
   std::vector<float> raw_, joint_values_, shape_values_, map_values_, control_values_;
 };

@@ -20,14 +20,15 @@ struct Influence {
   std::uint32_t joint;
   float weight;
 };
-/// The displacement that a blend shape channel at 1 adds to a vertex before skinning.
+/// The displacement, in file units, that a blend shape channel at 1 adds to a vertex before
+/// skinning.
 struct Shape {
   std::uint32_t channel;
   std::array<float, 3> delta;
 };
 
-/// A mesh of the file, sorted by vertex: influences and shapes of vertex v are [begins[v], begins[v
-/// + 1]).
+/// A mesh of the file. The influences of vertex v are influences[influence_begins[v]] up to, not
+/// including, influences[influence_begins[v + 1]]; shapes correspondingly.
 struct SkinMesh {
   std::vector<std::array<float, 3>> positions;  // file units
   std::vector<std::uint32_t> influence_begins;
@@ -39,9 +40,10 @@ struct SkinMesh {
 struct Surface {
   std::shared_ptr<const rig::Rig> rig;
   std::uint32_t lod = 0;
-  std::vector<std::uint32_t> parents;   // a root is its own parent
-  std::vector<std::uint32_t> order;     // joints, parents first
-  std::vector<Matrix> neutral_inverse;  // of each joint's transform in the neutral pose
+  std::vector<std::uint32_t> parents;  // [joints]; a root is its own parent
+  std::vector<std::uint32_t> order;    // joints, parents first
+  // [joints]: inverse of the joint's transform in the neutral pose, in the face's space.
+  std::vector<Matrix> neutral_inverse;
   std::vector<SkinMesh> meshes;
 };
 
@@ -54,7 +56,7 @@ core::Result<Surface> make_surface(const dna::Dna& dna, std::shared_ptr<const ri
                                    std::uint32_t lod);
 
 /// A joint's transform relative to its parent in a pose.
-/// In: delta  the joint's nine numbers of a Pose
+/// In: delta  the joint's nine numbers of a Pose, which are added to its neutral values
 Matrix local_matrix(const rig::Rig& rig, std::uint32_t joint, const float* delta);
 /// The matrix a * b, which applies b first.
 Matrix multiply(const Matrix& a, const Matrix& b);

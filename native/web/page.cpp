@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Functions that the web page needs in addition to risorius.h: deforming a mesh with its normals,
-// and reading .rzc files. Called from one thread; the page owns the arrays, which lie in this
-// memory.
+// and reading .rzc files. Called from one thread; the page owns the arrays, which are in the memory
+// of this WebAssembly module.
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -21,19 +21,19 @@ struct PageMesh {
   std::uint32_t positions, vertices, triangles, targets;
   const Four* rest;               // [positions]
   const std::uint32_t* source;    // [vertices]: index of the position of each vertex
-  const std::uint32_t* corners;   // [3 * triangles]: positions
-  const std::uint32_t* begins;    // [positions + 1]: influences
+  const std::uint32_t* corners;   // [3 * triangles]: indices of positions
+  const std::uint32_t* begins;    // [positions + 1]: first influence of each position
   const std::uint32_t* joints;    // [influences]
   const float* weights;           // [influences]
-  const std::uint32_t* moved;     // [targets + 1]
-  const std::uint32_t* channels;  // [targets]
-  const std::uint32_t* moves;     // [moved]: positions
-  const Four* deltas;             // [moved]
+  const std::uint32_t* moved;     // [targets + 1]: first entry of a target in moves and deltas
+  const std::uint32_t* channels;  // [targets]: blend shape channel
+  const std::uint32_t* moves;     // [entries]: index of the position that moves
+  const Four* deltas;             // [entries]: displacement of that position
   const Four* normals;            // [positions] undeformed; null: computed from the triangles
-  Four* shaped;                   // [positions]
-  Four* placed;                   // [positions]
-  Four* turned;                   // [positions]
-  float* out;                     // [6 * vertices]: position and normal
+  Four* shaped;                   // [positions] after the blend shapes
+  Four* placed;                   // [positions] after blend shapes and joints
+  Four* turned;                   // [positions] normals
+  float* out;                     // [vertices, 6]: position, then normal
 };
 
 Four cross(Four a, Four b) {
@@ -54,8 +54,8 @@ void add_shapes(const PageMesh& mesh, const float* channels) {
   }
 }
 
-// Deforms positions and normals by the joints. In: matrices  the four columns of each joint's
-// skinning matrix
+// Deforms positions, and normals unless mesh.normals is null, by the joints. In: matrices  the four
+// columns of each joint's skinning matrix
 void add_joints(const PageMesh& mesh, const Four* matrices) {
   for (std::uint32_t v = 0; v < mesh.positions; ++v) {
     Four x{}, y{}, z{}, w{};

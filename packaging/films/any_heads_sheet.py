@@ -85,7 +85,7 @@ class Face:
         """Left, right, bottom and top of a picture, cm.
 
         The eye meshes determine the frame, because expressions do not move them. A face without
-        them uses the bounds of all points. Also sets self._depth.
+        two eye meshes uses the mean and the width of all points. Also sets self._depth.
         """
         eyes = [
             np.asarray(self.dna.meshes[m].positions).mean(axis=0)

@@ -58,7 +58,7 @@ def import_face(path, lod):
 
 
 def place(controls, column, row):
-    """Moves a face so that the middle of its bounds is in the middle of a cell.
+    """Move a face so that the middle of its bounds is in the middle of a cell.
 
     Args:
         controls: the face's control armature.
@@ -72,7 +72,7 @@ def place(controls, column, row):
 
 
 def share_action(controls, first):
-    """Assigns the action of one face to another face, unchanged.
+    """Assign the action of one face to another face, unchanged.
 
     Args:
         controls: control armature of the face that gets the action.

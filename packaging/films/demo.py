@@ -72,7 +72,10 @@ def turn(bone, degrees):
 
 
 def act(controls):
-    """Insert keyframes: tracks of acting.py on the bone `face`, rotations of BONES on others."""
+    """Insert keyframes: tracks of acting.py on the bone `face`, rotations of BONES on others.
+
+    Returns the number of controls that have keyframes.
+    """
     face = controls.pose.bones["face"]
     available = {name for name in list(face.keys()) if name.startswith("CTRL_expressions.")}
     tracks, missing = acting.tracks(available)

@@ -170,9 +170,16 @@ def make_tree(
 def build(
     wheels: list[Path], out: Path, pure: list[Path] | None = None, sample: Path | None = None
 ) -> Path:
-    """Write the zip with all wheels into the folder `out`. Returns its path.
+    """Write the zip with all wheels into the folder `out`. Returns the path of the zip.
 
-    make_tree() explains the other arguments and the exceptions.
+    Args:
+        wheels: wheels of risorius, one for each Python and platform.
+        out: folder of the zip, which is made if it is missing.
+        pure: wheels for every Python and platform.
+        sample: folder with the sample face, or None.
+
+    Raises:
+        SystemExit: a wheel's version differs from the add-on's, or its platform is unknown.
     """
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:

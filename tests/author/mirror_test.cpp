@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Meshes with a known mirror.
+// find_mirror pairs the vertices and expressions of both sides of a mesh, or finds that it is not
+// symmetric.
 #include "author/mirror.h"
 
 #include <gtest/gtest.h>
@@ -48,7 +49,7 @@ TEST(Mirror, ThereIsNoneWhereAVertexHasNoOtherSide) {
 
 TEST(Mirror, ThereIsNoneWhereTwoVerticesHaveTheSameOtherSide) {
   Shapes shapes = kite(0);
-  shapes.neutral.push_back({1, 1.0001, 0.5});  // as near to the mirrored vertex 3 as vertex 1 is
+  shapes.neutral.push_back({1, 1.0001, 0.5});  // in reach of the mirrored vertex 3, like vertex 1
   shapes.edges.push_back({0, 4});
   shapes.edges.push_back({4, 2});
   EXPECT_TRUE(find_mirror(shapes).empty());

@@ -56,7 +56,8 @@ def skin_samples(places: Floats, faces: Sequence[Sequence[int]]) -> Skin:
 
     Args:
         places: [V, 3], neutral.
-        faces: vertex indices of each face, three or more.
+        faces: vertex indices of each face, three or more. The middle of a face is the mean of its
+            first four vertices.
     """
     normals = np.zeros_like(places)
     rows: list[tuple[int, int, int, int]] = []
@@ -82,7 +83,11 @@ class Ball:
     ROWS, COLUMNS = 90, 180
 
     def __init__(self, places: Floats) -> None:
-        """Make the table. Args: places  [V, 3] neutral vertices; inner layers have no effect."""
+        """Make the table.
+
+        Args:
+            places: [V, 3], neutral vertices; inner layers have no effect.
+        """
         low, high = places.min(axis=0), places.max(axis=0)
         around = places - (low + high) / 2
         ones = np.column_stack([2 * around, np.ones(len(around))])
@@ -178,7 +183,7 @@ def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
 
 
 class Cards:
-    """Vertices of hair, each assigned to the nearest skin triangle in the neutral pose."""
+    """Vertices of hair, each assigned to a triangle at the nearest vertex of the neutral skin."""
 
     # The nearest triangle in another pose is searched among the triangles that are near a hair in
     # the neutral pose: among the NEAR nearest, and in deep folds among the AROUND nearest.

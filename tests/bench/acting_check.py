@@ -55,12 +55,12 @@ class Points:
         self._probe = self._surface.probe(np.array(self._rows, np.int64))
 
     def at(self, raw: npt.NDArray[np.float32]) -> Floats:
-        """The registered vertices [points, 3] in a pose."""
+        """The registered vertices [points, 3] in a pose, in the unit of the DNA file."""
         self._raw = raw
         return self._probe.positions(raw)
 
     def whole(self, mesh: int) -> Floats:
-        """All vertices [V, 3] of a mesh in the pose of the last at()."""
+        """All vertices [V, 3] of a mesh in the pose of the last at(), in the file's unit."""
         return np.asarray(self._surface.positions(self._raw, mesh), np.float64)
 
 
@@ -84,7 +84,11 @@ class Eye:
         self._corners = face.points.add(face.head, self.lids.corners)
 
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
-        """The name of the check, the depth of each sample, and the samples' places."""
+        """The name of the check, the depth of each lid sample, and the samples' places.
+
+        Args:
+            now: result of Points.at() for a frame. Depths and places are in its unit.
+        """
         turn, shift = bodies.rigid_motion(self._rest, now[self._some])
         places = now[self._corners].mean(axis=1)
         return "lid in eye", self.ball.depth((places - shift) @ turn), places
@@ -121,7 +125,11 @@ class Mouth:
         return skin.kept(outward & tall & ahead & (radius < wide + 2.0) & (radius > 0.85 * wide))
 
     def depths(self, now: Floats) -> tuple[str, Floats, Floats]:
-        """The name of the check, the depth of each sample, and the samples' places."""
+        """The name of the check, the depth of each lip sample, and the samples' places.
+
+        Args:
+            now: result of Points.at() for a frame. Depths and places are in its unit.
+        """
         places = now[self._corners].mean(axis=1)
         deep = np.zeros(len(places))
         for lower, arch, rest, points in self.rows:
@@ -132,7 +140,10 @@ class Mouth:
 
 
 class Hair:
-    """Checks hair cards over the skin: either their roots, or their other vertices."""
+    """Checks hair cards over the skin: either their roots, or their other vertices.
+
+    At most `most` vertices, spread evenly over the mesh `name`, are checked.
+    """
 
     def __init__(self, face: Face, name: str, roots: bool, most: int = 4000) -> None:
         mesh = face.mesh(name)
@@ -155,6 +166,9 @@ class Hair:
         triangle, which gives wrong depths if skin rolls in (lips). So doubtful vertices are
         measured again from the nearest of Cards.NEAR triangles. Vertices that are still too deep
         are measured from Cards.AROUND triangles, because folds bring distant triangles near.
+
+        Args:
+            now: result of Points.at() for a frame. Depths and places are in its unit.
         """
         places = now[self._hairs]
         deep = -bodies.Cards.height(places, now[self._corners])
@@ -199,12 +213,15 @@ class Face:
         return next(m for n, m in self._meshes.items() if n.startswith(name))
 
     def corneas(self, side: float) -> list[Floats]:
-        """The vertices of the cornea on a side, if the cornea is a separate mesh."""
+        """Vertices of each mesh named cornea on one side; empty if the face has no such mesh.
+
+        side: a number with the sign of x on the side.
+        """
         found = [self.rest[m] for n, m in self._meshes.items() if n.startswith("cornea")]
         return [places[places[:, 0] * side > 0] for places in found]
 
     def faces(self, mesh: int) -> list[list[int]]:
-        """Vertices of each face."""
+        """The vertex indices of each polygon of a mesh."""
         held = self.dna.meshes[mesh]
         corners = np.asarray(held.layout_positions)[np.asarray(held.face_layouts)].tolist()
         ends = np.asarray(held.face_offsets).tolist()
@@ -223,7 +240,10 @@ class Face:
 
 
 def measure(face: Face, acting: Acting) -> dict[str, npt.NDArray[np.float64]]:
-    """Check -> float64[frames, 4]: largest depth of each frame in mm, and x, y, z of the place."""
+    """Check -> float64[frames, 4]: largest depth of each frame in mm, and where it is.
+
+    The place (x, y, z) is in the unit of the DNA file.
+    """
     checks = {name: np.zeros((len(acting.raw), 4)) for name in LIMITS}
     for frame, raw in enumerate(acting.raw):
         now = face.points.at(raw)
@@ -238,7 +258,12 @@ def measure(face: Face, acting: Acting) -> dict[str, npt.NDArray[np.float64]]:
 def report(
     face: Face, acting: Acting, checks: dict[str, npt.NDArray[np.float64]], worst: int
 ) -> list[dict[str, Any]]:
-    """The results of the checks as rows, with the worst frames of each."""
+    """The results of the checks as rows, with the worst frames of each.
+
+    Args:
+        checks: result of measure().
+        worst: number of frames to list for each check.
+    """
     rest = measure(face, Acting(np.array([face.rig.initial_raw_controls], np.float32), ["rest"]))
     rows = []
     for check, found in checks.items():

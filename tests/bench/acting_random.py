@@ -104,7 +104,7 @@ class _Actor:
         return np.float32(weight) * self._poses[name], f"{name} {weight:.2f}"
 
     def _looks(self, pose: Pose, text: str) -> tuple[Pose, str]:
-        """Add a gaze to half of the frames, and a blink to a third."""
+        """Add a gaze with probability 1/2, and a blink with 1/3, to a pose and its description."""
         if self._random.random() < 0.5:
             for pair in _LOOKS:
                 look, value = str(self._random.choice(pair)), self._random.uniform(0.0, 0.9)

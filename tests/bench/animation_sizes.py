@@ -5,8 +5,8 @@
 
 The animation is the demo's acting, smoothed between its keyframes: at 30 and 60 fps, and at
 30 with the noise of a capture on all controls. The size of joints and blend shapes counts only
-curves that change, as a bake writes them: three translations and three rotations of each joint that
-moves, and blend shape weights. Sizes are given for plain float32, and for the lossless clip format.
+curves that change: of the three translations and three rotations of each joint, and of the blend
+shape weights. Sizes are given for plain float32, and for the lossless clip format.
 """
 
 from __future__ import annotations

@@ -41,7 +41,11 @@ class Posed:
         self.rest = self.at("")
 
     def at(self, expression):
-        """float64[V, 3]: posed skin. Args: expression  names of raw controls, joined by +."""
+        """float64[V, 3]: posed skin.
+
+        Args:
+            expression: names of raw controls, joined by +.
+        """
         raw = np.array(self.rig.initial_raw_controls, np.float32)
         for name in filter(None, expression.split("+")):
             raw[self.names.index(name)] = 1
@@ -52,7 +56,11 @@ class Posed:
 
 
 def errors(found, true):
-    """Mean, 95 % quantile and largest error of moving vertices in mm; None if none moves."""
+    """Mean, 95 % quantile and largest error in mm of the vertices that move in `true`, or None.
+
+    Args:
+        found, true: float64[V, 3], displacements in cm.
+    """
     moving = np.linalg.norm(true, axis=1) > _MOVING
     if not moving.any():
         return None

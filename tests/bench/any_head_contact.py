@@ -75,7 +75,18 @@ def blinks(ways):
 
 
 def row_of(target, fitted, singles, pairs, work, contacts, bodies, most):
-    """The values of one table row, in the order of HEADS."""
+    """The values of one table row, in the order of HEADS without the head's name.
+
+    Args:
+        target: the head's skin.
+        fitted: its Fittings.
+        singles: control -> displacements float64[V, 3], cm.
+        pairs: tuple of controls -> displacements of their corrective.
+        work: Repairing that finds the faults of a pose.
+        contacts: Contacts that measures the volume of skin in teeth.
+        bodies: not read.
+        most: number of poses whose volume is summed.
+    """
     poses = {(name,): way for name, way in singles.items()} | pairs
     faults = {pose: work.faults(pose, way) for pose, way in poses.items()}
     closing = set(closing_pose(singles, pairs))
@@ -117,8 +128,10 @@ def repaired(head: Standing, template, source: TemplateFace, strength: float = 1
     """The template's expressions on a head from stand() (upright, in cm), before and after repair.
 
     Args:
-        template: the DNA file.
-        source: the same, read by read_template.
+        head: the head's parts and landmarks.
+        template: the template's Dna.
+        source: the template as a TemplateFace.
+        strength: strength of the transferred expressions; 1: as large as the template's.
     """
     found = sort_parts(head.parts)
     target = Surface.of_polygons(found.face.mesh.positions, found.face.mesh.faces)

@@ -100,6 +100,8 @@ def worse(search, on):
 def grew(a, b):
     """Whether `b` exceeds `a` by 0.1 mm in greatest depth, or by 1 % in largest stretch.
 
+    A stretch of at most TORN, 2.5 times the area of a polygon, does not count.
+
     Args:
         a: faults of a skin without a corrective.
         b: faults of the same skin with the corrective.

@@ -34,7 +34,12 @@ MACROS = {
 
 
 def head(path, macros=()):
-    """(positions [V, 3], displacements [E, V, 3], polygons) of the CC0 head, in decimetres."""
+    """(positions [V, 3], displacements [E, V, 3], polygons) of the CC0 head, in decimetres.
+
+    Args:
+        path: zip with the CC0 data of the sample people.
+        macros: names of body shapes that are added to the base mesh.
+    """
     source = Source(path)
     base = source.base_mesh()
     names = zipfile.ZipFile(path).namelist()

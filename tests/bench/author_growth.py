@@ -28,7 +28,7 @@ ROWS = {
 
 
 def ball(vertices):
-    """Positions [V, 3] and edges of a sphere of rings."""
+    """Positions [V, 3] and edges of a sphere with radius 12 and about `vertices` vertices."""
     rings = max(4, round(np.sqrt(vertices / 2)))
     across = vertices // rings
     down, round_ = np.meshgrid(
@@ -50,7 +50,7 @@ def ball(vertices):
 
 
 def one(vertices, expressions, joints):
-    """CPU seconds of a fit, and its memory in MB without the input."""
+    """Result of one fit: "cpu", its CPU seconds; "mb", the growth of the peak memory in MB."""
     from risorius.author import FitOptions, fit_joints
 
     positions, edges = ball(vertices)

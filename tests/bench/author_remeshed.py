@@ -29,7 +29,7 @@ from risorius_people.source import Source, fetch
 
 
 def old_head(source):
-    """The base head: positions [V, 3] in cm, polygons, displacements of ARKit's expressions."""
+    """The man's head at LOD 1: positions [V, 3], polygons, ARKit shape -> displacements, in cm."""
     _, parts, body = blend_shape_face.assemble(source, print, MAN)
     part = next(p for p in parts if p.name == "head_lod1_mesh")
     count = len(body.positions)
@@ -40,7 +40,7 @@ def old_head(source):
 
 
 def remeshed(positions, faces, voxel):
-    """Positions and polygons of Blender's voxel remesh, made symmetric.
+    """Positions in cm and polygons of Blender's voxel remesh of a head.
 
     Args:
         positions: float64[V, 3], cm.

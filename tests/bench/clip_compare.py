@@ -104,7 +104,14 @@ def fastest(run: Callable[[], object]) -> float:
 
 
 def measure(name: str, curves: Curves) -> tuple[int, float, float] | None:
-    """The packed size in bytes, and the speeds of packing and unpacking in GB/s."""
+    """The packed size in bytes, and the speeds of packing and unpacking in GB/s.
+
+    None if the packer's package is not installed.
+
+    Args:
+        name: key of PACKERS.
+        curves: the curves to pack.
+    """
     make, option = PACKERS[name]
     try:
         pack, unpack = make(option)

@@ -14,7 +14,7 @@ RATE = 60
 
 
 def sparse(frames: int = 3600) -> Curves:
-    """Hand-keyed animation sampled at 60 fps: 72 of 260 controls have keyframes, 8 to 40 frames
+    """Hand-keyed animation sampled at 60 fps: 72 of 260 controls have keyframes, 8 to 39 frames
     apart; 80 % of the segments are Bezier with automatic handles, 12 % linear, 8 % constant. A
     quarter of the keyframes repeat the value before them. The other controls stay at 0."""
     rng = np.random.default_rng(SEED)

@@ -10,7 +10,7 @@
 
 namespace risorius::bench {
 
-/// The matrix of all joint groups, one row per joint attribute.
+/// The matrix of all joint groups at one LOD, one row per joint attribute, one column per control.
 struct Csr {
   std::vector<std::uint32_t> begins;  // [rows + 1] index of each row's first value
   std::vector<std::uint16_t> columns;
@@ -22,7 +22,8 @@ struct Csr {
 class Baseline {
  public:
   Baseline(const dna::Dna& dna, std::uint32_t lod);
-  /// Runs all stages of an evaluation for the raw controls of one frame.
+  /// Evaluates the raw controls of one frame: correctives, joint groups, channels and maps.
+  /// Networks, solvers and setups are left out.
   void evaluate(const float* raw);
   const Csr& matrix() const { return matrix_; }
   const std::vector<float>& joints() const { return joints_; }

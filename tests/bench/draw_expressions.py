@@ -87,7 +87,11 @@ class Face:
         self.middle, self.apart = (eyes[0] + eyes[1]) / 2, (eyes[0] - eyes[1]).length
 
     def look(self, at: str) -> None:
-        """Point the camera at a part of the face. Args: at  name of the part, a key of LOOKS."""
+        """Point the camera at a part of the face.
+
+        Args:
+            at: name of the part, a key of LOOKS.
+        """
         from mathutils import Vector
 
         camera = self.scene.camera

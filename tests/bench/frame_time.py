@@ -70,7 +70,13 @@ def empty_scene(package):
 
 
 def import_face(path, mode, lods=(0,)):
-    """(control armature, deforming armature, import time in seconds) of an imported face."""
+    """(control armature, deforming armature, import time in seconds) of an imported face.
+
+    Args:
+        path: path of the DNA file.
+        mode: shape mode: AUTO (Direct), LIVE or KEYS.
+        lods: indices of the LODs to import, below 8.
+    """
     before = set(bpy.data.objects)
     begin = time.perf_counter()
     chosen = tuple(i in lods for i in range(8))
@@ -142,7 +148,14 @@ def own_time(package, frames):
 
 
 def plain_way(controls, rig, path, loops):
-    """Replace the add-on by a handler of bones and shape keys. Returns the number of bones."""
+    """Replace the add-on by a handler of bones and shape keys. Returns the number of bones.
+
+    Args:
+        controls: the control armature.
+        rig: the deforming armature.
+        path: path of the DNA file.
+        loops: True: one assignment per bone and shape key; False: in bulk.
+    """
     import numpy as np
     import risorius
 

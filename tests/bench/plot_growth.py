@@ -27,7 +27,8 @@ Point = tuple[float, float, float | None, float | None]
 def read(path: Path) -> tuple[str, dict[str, list[Point]]]:
     """The title in the first line, and panel -> sorted points.
 
-    A point is (x, us of Risorius, us of a CSR matrix, us of just reading the active columns).
+    A point is x, then the microseconds of Risorius, of a CSR matrix, and of just reading the active
+    columns. The last two are None where they were not measured.
     """
     lines = path.read_text(encoding="utf-8").splitlines()
     points: dict[str, list[Point]] = {name: [] for name in PANELS}

@@ -269,9 +269,10 @@ def is_mirrored(face, goal):
 
 
 def best_drag(face, raw, wanted, moving, mirrored):
-    """(error in mm, raw controls, start, target, key events) of the best drag, or None.
+    """(error in mm, raw controls, start, target, key events) of the best drag.
 
-    Start and target are places of the dragged vertex.
+    Start and target are places of the dragged vertex. None if no moving vertex that is shown is
+    away from its target.
     """
     here = face.at(raw)
     off = np.linalg.norm((wanted - here) @ face.screen.T, axis=1) * (moving & face.shown)
@@ -292,9 +293,10 @@ def best_drag(face, raw, wanted, moving, mirrored):
 
 
 def solutions(face, raw, vertex, wanted, mirrored):
-    """(raw controls, key events) of drags of a vertex: with all sliders, then with one slider,
+    """(raw controls, key events) of each of four drags of a vertex.
 
-    for each of the three sliders that alone bring the vertex nearest to its target.
+    The first is with all sliders. The others are each with one slider: the three that alone bring
+    the vertex nearest to its target.
     """
     points, targets = [(face.mesh, vertex)], [wanted[vertex]]
     ease = risorius.local_ease(

@@ -40,7 +40,14 @@ METHODS = {
 
 @dataclass
 class Case:
-    """A drag of the neutral face: vertices of the largest mesh, targets, raw controls or None."""
+    """A drag of the neutral face.
+
+    Attributes:
+        vertices: dragged vertices of the largest mesh: one, or one on each side.
+        targets: target of each vertex, float64[3] in the file's unit.
+        pose: raw controls of the artist's pose that gives the targets; None for a random pull.
+        mirrored: True: both sides of the face move symmetrically.
+    """
 
     vertices: list[int]
     targets: list[np.ndarray]

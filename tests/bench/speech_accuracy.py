@@ -27,7 +27,7 @@ from risorius.speech.phones import VISEMES, viseme_of
 
 STEP = 0.01  # seconds per frame
 
-# espeak-ng voice, words per minute, pitch from 0 to 99
+# espeak-ng voice, words per minute, pitch from 0 to 100
 TUNED_VOICES = (("en-us", 175, 50), ("en-us+f2", 150, 60), ("en-us+m3", 195, 40))
 HELD_OUT_VOICES = (("en-us+m7", 165, 45), ("en-us+f4", 180, 55), ("en-us+m1", 145, 35))
 TUNED = (

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Units keep the meaning of the rows from their groups.
+// regroup() splits the joint groups into units (one row, or all rotation rows of a quaternion
+// joint). The new groups of units must give the joints that the old groups gave.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {
@@ -35,8 +36,8 @@ TEST(Regroup, KeepsQuaternionJointsWhole) {
 }
 
 TEST(Regroup, TheLastWriterOfARowStillWins) {
-  // The second group overwrites a row of the first one at LOD 0 but is absent at LOD 1. The third
-  // group overwrites a row of the first one at every LOD.
+  // The second group overwrites row 0 of the first one at LOD 0 but does not write this row at LOD
+  // 1. The third group overwrites row 9 of the first one at every LOD.
   dna::Dna dna = make_face(2, 0, 2);
   dna.behavior.joint_groups =
       std::vector{make_group({2, 2}, {0}, {0, 9}, {1, 2}), make_group({2, 1}, {1}, {1, 0}, {3, 4}),

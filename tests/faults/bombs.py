@@ -36,7 +36,13 @@ def _raw_record(name: bytes, values: bytes) -> bytes:
 
 
 def _placed(head: bytes, name: bytes, inner: bytes) -> bytes:
-    """`head` and a record that contains `inner`; its end offsets count from the file's begin."""
+    """`head` and a record that contains `inner`; end offsets count from the file's beginning.
+
+    Args:
+        head: the beginning of the file.
+        name: name of the record.
+        inner: records of _raw_record(), concatenated.
+    """
     start = len(head) + _HEAD + len(name)
     out, at = [], 0
     while at < len(inner):

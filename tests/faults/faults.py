@@ -113,7 +113,10 @@ print("done")
 
 
 def flips(rounds: int) -> Iterator[Row]:
-    """DNA files, clips and cached rigs with changed bits must give an error or the right result."""
+    """DNA files and clips with changed bits must be read, or give an error of Risorius.
+
+    A cached rig with changed bits must give the right poses, and must be built again.
+    """
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
         clip = folder / "take.rzc"
@@ -132,7 +135,14 @@ def flips(rounds: int) -> Iterator[Row]:
 
 
 def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longest: float) -> None:
-    """Wait for a random time, or until a temporary file shows that the command is writing."""
+    """Wait for a random time, or until a temporary file shows that the command is writing.
+
+    Args:
+        process: the running command.
+        room: its folders.
+        draw: random numbers.
+        longest: upper bound of the random time in seconds.
+    """
     end = time.monotonic() + draw.uniform(0.0, longest)
     if draw.random() < 0.5:
         end = time.monotonic() + 60.0
@@ -147,7 +157,14 @@ def _wait(process: subprocess.Popen[str], room: Room, draw: random.Random, longe
 def _signalled(
     group: str, what: signal.Signals, rounds: int, names: Sequence[str]
 ) -> Iterator[Row]:
-    """Send a signal at random moments; the output file must then be the complete old or new one."""
+    """Send a signal at random moments; the output file must then be the complete old or new one.
+
+    Args:
+        group: name of the group of rows.
+        what: the signal.
+        rounds: runs of each command.
+        names: keys of COMMANDS; empty: all.
+    """
     draw = random.Random(20)
     for name in names or COMMANDS:
         with tempfile.TemporaryDirectory() as text:

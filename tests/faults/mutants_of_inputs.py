@@ -38,7 +38,7 @@ from room import Done, Row, complaints
 from valid_inputs import make_inputs
 
 CPU_SECONDS = 20  # limit of CPU time of a round
-MEMORY = 300 * MiB  # limit for small files; the readers of the library grant the same
+MEMORY = 300 * MiB  # limit for small files, in bytes
 MEMORY_PER_BYTE = 40
 _PAGE = "<html><!--FACE--></html>"
 

@@ -45,7 +45,13 @@ class Done:
 
 @dataclass
 class Row:
-    """The results of a trial: number of runs, and a sentence for each failure."""
+    """The results of a trial.
+
+    Attributes:
+        runs: number of runs.
+        faults: a sentence for each failure.
+        not_run: why the trial did not run; "" if it ran.
+    """
 
     group: str
     name: str
@@ -78,7 +84,7 @@ def voice(path: Path) -> Path:
 
 
 def jobs(folder: Path) -> Path:
-    """Write a jobs.toml of four jobs with the take; outputs are in folder / "out"."""
+    """Write a jobs.toml of two jobs, LOD 0 and 1 of the take; outputs are in folder / "out"."""
     path = folder / "jobs.toml"
     path.write_text(
         'output = "out"\n[[jobs]]\nclips = "*.csv"\n'

@@ -166,7 +166,7 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     """Add a short spine and facial joints on the surface of the head.
 
     Returns:
-        float32[J, 3] world positions in the neutral pose, without the small neutral rotations.
+        float32[J, 3] world positions in the neutral pose.
     """
     parents = np.full(JOINTS, 3)
     parents[:4] = [0, 0, 1, 2]
@@ -231,7 +231,7 @@ def add_behavior(dna: risorius.Dna, random: np.random.Generator) -> None:
     dna.joint_row_count, dna.joint_column_count = 9 * JOINTS, CONTROLS
     bounds = np.linspace(4, JOINTS, GROUPS + 1).astype(
         int
-    )  # the spine and the drivers are the host's
+    )  # joints 0 to 3 (spine, neck, head) are in no group
     dna.joint_groups = [joint_group(range(a, b), random) for a, b in pairwise(bounds)]
     channels = np.arange(CHANNELS)
     dna.blend_shape_channels = risorius.BlendShapeChannels(

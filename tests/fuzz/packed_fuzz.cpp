@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Packed buffers of meshes. The first 4 bytes choose the packing and the number of rows. If the
-// first byte is odd, the rest is rows, which must survive packing.
+// Packed buffers of meshes. The first 4 bytes choose the packing. If the first byte is even, they
+// also choose the number of rows, and the rest is a packed buffer, usually a wrong one. If it is
+// odd, the rest is rows, which must survive packing and unpacking.
 #include "author/packed.h"
 #include "fuzz/promise.h"
 

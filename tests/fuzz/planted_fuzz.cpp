@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A deliberately faulty target that accepts every second DNA file. The script that runs the targets
-// must report it.
+// A deliberately faulty target: it reports a broken promise for each damaged DNA file with an even
+// number of bytes. packaging/check/fuzz.sh demands that fuzzing finds this fault.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

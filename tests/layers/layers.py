@@ -50,7 +50,14 @@ def room_of(path: str, rooms: Mapping[str, object]) -> str | None:
 
 
 def included(path: str, text: str, files: frozenset[str]) -> Iterator[Use]:
-    """Yields a C++ file's includes. Quoted names are searched in its folder, then in native/."""
+    """Yields a C++ file's includes, except standard headers, which have no slash and no dot.
+
+    Args:
+        path: path of the file below the part's folder. Quoted names are searched in the file's
+            folder first, then in the part's folder.
+        text: content of the file.
+        files: paths of all files of the part.
+    """
     for quoted, angled, other in _includes(text):
         name = quoted or angled
         places = [_joined(PurePosixPath(path).parent, name)] if quoted else []
@@ -81,7 +88,16 @@ def _joined(folder: PurePosixPath, name: str) -> str:
 
 
 def imported(path: str, text: str, name: str, files: frozenset[str]) -> Iterator[Use]:
-    """Yields imports of a Python file, including the ones in functions and by import_module."""
+    """Yields imports of a Python file, including the ones in functions and by import_module.
+
+    Imports of the standard library are omitted. Code that is run from a text is "unreadable".
+
+    Args:
+        path: path of the file below the package's folder.
+        text: content of the file.
+        name: name of the package.
+        files: paths of all files of the package.
+    """
     package = (name, *PurePosixPath(path).parts[:-1])
     for module, member in _imports(text, package):
         if module is None:
@@ -108,7 +124,10 @@ def _imports(text: str, package: tuple[str, ...]) -> list[tuple[tuple[str, ...] 
 def _names(
     nodes: list[ast.AST], package: tuple[str, ...]
 ) -> Iterator[tuple[tuple[str, ...] | None, str]]:
-    """(module, imported name) of each import; (None, code) if the module's name is not literal."""
+    """(module, imported name) of each import; (None, code) if its module cannot be read.
+
+    Calls of exec, eval, run_module and run_path count as imports that cannot be read.
+    """
     importers = {"import_module", "__import__"}
     for node in nodes:
         if isinstance(node, ast.ImportFrom) and node.module == "importlib":

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Finds the errors and notes of the package that the add-on shows, for comparison with a table."""
+"""Finds the errors and notes of the package that the add-on shows, for comparison with their
+translations.
+"""
 
 import ast
 import re
@@ -59,7 +61,7 @@ def noted(source: str) -> list[str]:
 
 
 def without_names(text: str) -> str:
-    """An English message of the table, with {} for each {name}."""
+    """An English message of the table of translations, with {} for each {name}."""
     return re.sub(r"\{\w+\}", "{}", text)
 
 

@@ -82,18 +82,25 @@ def _is_fixed(value: ast.expr, session: str) -> bool:
 
 
 def _is_constant(value: ast.expr, frozen: set[str]) -> bool:
-    """Whether a constant (name in UPPER_CASE) may have this value. Args: frozen  see _frozen()."""
+    """Whether a constant (name in UPPER_CASE) may have this value. frozen: names of classes whose
+    objects cannot change.
+    """
     if not isinstance(value, ast.Call):
         return not isinstance(value, (ast.GeneratorExp, ast.NamedExpr))
     name = _last(value.func)
     allowed = VALUES | frozen | FIXED
     made = name.lstrip("_")[:1].isupper() and not name.endswith("Property")  # a declaration
-    owner = _first(value.func)  # of Matrix.Identity
+    owner = _first(value.func)  # Matrix in Matrix.Identity(4)
     return name not in ALWAYS_MUTABLE and (not made or name in allowed or owner in allowed)
 
 
 class _File(NamedTuple):
-    """A parsed file. Attributes: body  its statements; nodes  type -> its nodes of the type."""
+    """A parsed file.
+
+    Attributes:
+        body: the statements of the module.
+        nodes: type of syntax node -> all nodes of the type in the file.
+    """
 
     body: list[ast.stmt]
     nodes: dict[type, list[Any]]
@@ -190,7 +197,10 @@ def _targets(node: ast.AST) -> list[ast.expr]:
 
 
 def _changed(node: ast.AST) -> ast.expr | None:
-    """The object that a call or an assignment changes, for example x in x[0] = 1 or x.append(1)."""
+    """The object that a call or an assignment changes, for example x in x[0] = 1 or x.append(1).
+
+    None if the statement only gives a name another value.
+    """
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
         return node.func.value if node.func.attr in CHANGES else None
     for target in _targets(node):

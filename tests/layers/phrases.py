@@ -25,7 +25,7 @@ _PATTERNS = {
 
 
 def files(root: Path) -> dict[str, str]:
-    """Path below root -> text of each source file of `native` and of the C++ tests."""
+    """Path below root -> text of each file in FOLDERS with one of their endings."""
     return {
         path.relative_to(root).as_posix(): path.read_text(encoding="utf-8")
         for folder, kinds in FOLDERS.items()

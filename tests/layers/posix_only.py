@@ -25,7 +25,7 @@ def _imports(node: ast.AST) -> Iterator[str]:
 def _opens_text(node: ast.Call, name: str) -> bool:
     """Whether a call opens text without an encoding, which on Windows may not be UTF-8."""
     if name not in ENCODING_AT or (name == "open" and isinstance(node.func, ast.Attribute)):
-        return False  # os.open, zipfile.open and similar functions read no text
+        return False  # os.open, zipfile.open and others, which may read no text
     given = {keyword.arg: keyword.value for keyword in node.keywords}
     mode = (
         [*node.args[1:2], *(v for k, v in given.items() if k == "mode")] if name == "open" else []

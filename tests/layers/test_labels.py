@@ -17,7 +17,11 @@ NAMES = {"Tafel": "Brett", "Regler": "Schieberegler"}
 
 
 def lower_words(text):
-    """(word, label) of each word in a label of a source text that begins with a small letter."""
+    """(word, label) of each word in a label that begins with a small letter but must not.
+
+    The first word of a label, words in brackets and the words in SMALL may begin with a small
+    letter.
+    """
     for label in LABEL.findall(text):
         bare = re.sub(r"\([^)]*\)", "", label)
         if "{" in label or label.endswith((".", "?", ":", "…")):

@@ -16,7 +16,14 @@ def files_of(part):
 
 
 def planted(part, path, text):
-    """Sentences of the check after text is added to a part, without those about folder sizes."""
+    """Sentences of `violations` after a text is added to a file, except sentences about folder
+    sizes.
+
+    Args:
+        part: key of a part of the project in rooms.toml.
+        path: path of the file below the part's folder; the file need not exist.
+        text: code that is appended to the file.
+    """
     files = dict(files_of(part))
     files[path] = files.get(path, "") + "\n" + text + "\n"
     return [line for line in violations(part, files) if "are the most" not in line]

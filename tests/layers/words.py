@@ -27,7 +27,12 @@ def product_files(root: Path) -> dict[str, str]:
 
 
 def defines(word: Mapping, path: str, text: str) -> bool:
-    """Whether a file defines a word. Args: word  entry of words.toml; path, text  of the file."""
+    """Whether a file defines a word.
+
+    Args:
+        word: entry of words.toml.
+        path, text: path and content of the file.
+    """
     if not path.endswith(word.get("in", "")):
         return False
     if "words" in word:

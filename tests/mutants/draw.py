@@ -36,7 +36,11 @@ class Mutant:
     after: str
 
     def applied(self, source: str) -> str:
-        """The source text with the changed line."""
+        """The source text with the changed line.
+
+        Raises:
+            ValueError: the line of the source is not `before`.
+        """
         lines = source.splitlines(keepends=True)
         if lines[self.line - 1] != self.before:
             raise ValueError(f"{self.path}:{self.line} is no longer {self.before.strip()!r}")

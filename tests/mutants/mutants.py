@@ -40,7 +40,8 @@ PROJECT = HERE.parents[1]
 SEED = 15
 COUNTS = {"native": 80, "package": 60, "scene": 60}
 # Part -> (patterns of files that get mutants, patterns of exceptions). Headers get none, because a
-# change rebuilds all files that include them. Bindings get none, because they are tables of names.
+# change rebuilds all files that include them; except *_body.h, which only the kernels include.
+# Bindings get none, because they are tables of names.
 SOURCES = {
     "native": (["native/**/*.cpp", "native/simd/*_body.h"], ["native/bindings/*", "native/web/*"]),
     "package": (["native/python/risorius/**/*.py", "native/python/risorius_people/**/*.py"], []),
@@ -121,7 +122,11 @@ class Copy:
         self._fresh = False  # whether the Python module is built from the present sources
 
     def refresh(self) -> None:
-        """Copy changed files and build. Unchanged copies keep their times, so Ninja skips them."""
+        """Copy changed files, and build the copy or, for package and scene, take the wheel's
+        module.
+
+        Unchanged copies keep their times, so Ninja skips them.
+        """
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
             cwd=PROJECT, check=True, capture_output=True, text=True,
@@ -187,7 +192,10 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the failed test passes without the mutant; if not, its failure proves nothing."""
+        """Whether the failed test passes without the mutant; if not, its failure proves nothing.
+
+        A test that has passed before is not run again.
+        """
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)

@@ -11,7 +11,7 @@ import pytest
 
 PROJECT = Path(__file__).resolve().parents[2]
 GOLDEN = PROJECT / "tests" / "data" / "golden"
-# Folder with golden data. The variable can name a folder with other files of the same kind.
+# Folder with golden data. RISORIUS_GOLDEN can name a folder with other files of the same kind.
 GOLDEN_SET = Path(os.environ.get("RISORIUS_GOLDEN", GOLDEN))
 SHARED = Path(os.environ.get("RISORIUS_SHARED", PROJECT.parent / "shared"))
 
@@ -41,7 +41,10 @@ def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object
 
 
 def lods_of(about: dict) -> list[int] | None:
-    """The LODs of the DNA file that a filtered load kept; None if the load was not filtered."""
+    """The LODs of the DNA file that a filtered load kept; None if the load was not filtered.
+
+    about: content of an evaluation's JSON.
+    """
     load, count = about["load"], about["counts"]["lods"]
     if load["lods"]:
         return load["lods"]
@@ -51,7 +54,7 @@ def lods_of(about: dict) -> list[int] | None:
 
 
 def require_extra(path: Path, what: str) -> Path:
-    """Skip a test if `path` is missing; the summary of the run names the missing data (`what`)."""
+    """Return `path`; skip the test if it is missing. The run's summary names the data (`what`)."""
     if not path.exists():
         _not_run.add(what)
         pytest.skip(f"extra not run, no data: {what}")

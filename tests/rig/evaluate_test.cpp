@@ -147,7 +147,7 @@ TEST(EvaluateCorrectives, RawControlsKeepTheirUnclampedValue) {
 }
 
 TEST(EvaluateCorrectives, NanFactorSpoilsTheCorrective) {
-  const Rig rig = corrective_rig({0, 1}, {1, 1});  // independent of which factor watches it
+  const Rig rig = corrective_rig({0, 1}, {1, 1});  // the order of the factors must not matter
   EXPECT_TRUE(std::isnan(evaluate_once(rig, {kNan, 1.0f}).controls[2]));
   EXPECT_TRUE(std::isnan(evaluate_once(rig, {1.0f, kNan}).controls[2]));
   EXPECT_EQ(evaluate_once(rig, {0.0f, kNan}).controls[2], 0.0f);
@@ -282,7 +282,8 @@ TEST(EvaluateMaps, LodUsesLeadingRowsEvenInsideARun) {
   EXPECT_EQ(evaluate_once(rig, {0.25f}, 1).animated_maps[0], 0.25f);
 }
 
-// A run of rows is skipped while its input is 0. The result must equal a loop over all rows.
+// A run of rows is skipped while its input is 0, if it adds nothing then. The result must equal a
+// loop over all rows.
 TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
   constexpr std::uint16_t kRaw = 40, kMaps = 7;
   constexpr std::size_t kRows = 300;
@@ -313,7 +314,7 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
     for (const std::uint32_t lod : {0u, 1u}) {
       std::vector<float> sums(kMaps);
       const std::size_t count = lod == 0 ? kRows : kRows / 2 + 1;
-      bool found = false;  // the row of the run that counts
+      bool found = false;  // whether an earlier row of this run counts
       for (std::size_t i = 0; i < count; ++i) {
         const bool begins = i == 0 || inputs[i] != inputs[i - 1] || outputs[i] != outputs[i - 1];
         const float v = raw[inputs[i]];
@@ -337,8 +338,8 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
 
 // ---- blend shapes
 
-// With few active controls each lists its channels; with many, every channel reads its control. The
-// result must be the same.
+// With few active controls each active control lists its channels; with many, every channel reads
+// its control. The result must be the same.
 TEST(EvaluateShapes, ChannelsFollowTheirControlsHoweverManyAreActive) {
   constexpr std::uint16_t kRaw = 64, kShapes = 150;
   std::mt19937 random(6);
@@ -380,8 +381,6 @@ TEST(EvaluateShapes, CopyTheirControlUnclampedAndTheLastWins) {
   EXPECT_EQ(evaluate_once(rig, {2.5f, -1.0f}, 1).blend_shapes, (std::vector{0.0f, 0.0f, 2.5f}));
 }
 
-// ---- empty faces
-
 TEST(EvaluateShapes, ARunOfChannelsIsCutByTheLodAndLeavesTheOthersZero) {
   dna::Dna dna = make_face(3, 0, 1);
   dna.definition.blend_shape_channel_names = names("shape", 6);
@@ -401,6 +400,8 @@ TEST(EvaluateShapes, ARunOfChannelsIsCutByTheLodAndLeavesTheOthersZero) {
     EXPECT_EQ(pose.blend_shapes, expected) << lod;
   }
 }
+
+// ---- empty faces
 
 TEST(Evaluate, EmptyFaceGivesAnEmptyPose) {
   const Rig rig = must_compile(dna::Dna{});

@@ -16,7 +16,8 @@ using namespace testing_support;
 constexpr std::size_t kInputs = 12, kCorrectives = 40, kBones = 30, kLevels = 3;
 
 // The evaluator has two ways to find the active channels. A face with 20 channels (seed 1) looks at
-// every channel in most frames. A face with 150 channels looks only at channels of active controls.
+// every channel in most frames. A face with 150 channels looks only at the channels of active
+// controls at LOD 0.
 void add_channels(dna::Dna& dna, std::uint32_t seed) {
   const std::size_t count = seed == 1 ? 20 : 150;
   dna.definition.blend_shape_channel_names = names("shape", count);
@@ -54,8 +55,9 @@ void add_maps(dna::Dna& dna) {
   table.cut_values = std::move(cut);
 }
 
-// A face with correctives of two to four raw controls, and joint groups that all controls drive.
-// The values are random, the sizes are fixed.
+// A face with correctives of two to four raw controls, and joint groups that list all controls. The
+// values and the factors of the correctives are random. Of the sizes, only the number of channels
+// depends on the seed.
 dna::Dna correcting_face(std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> value(-2.0f, 2.0f);

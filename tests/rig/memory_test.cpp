@@ -27,9 +27,10 @@ Copy copy(std::span<const std::uint8_t> block) {
   return {owner, {owner.get(), block.size()}};
 }
 
-// Limit of heap memory: kTimesTheBlock times the block's size, plus kBeside bytes. The limit is far
-// below the limit for forged blocks, because compile makes only rigs whose scratch memory is as
-// long as lists in their blocks.
+// Limits of heap memory. Opening a block takes at most the block's size plus kBeside bytes. Two
+// workspaces and a pose take at most kTimesTheBlock times the block's size plus kBeside bytes. The
+// second limit holds only for rigs that compile() made: their scratch memory has the lengths of
+// lists in the block. The workspaces of a forged block may be far larger.
 constexpr std::size_t kTimesTheBlock = 4, kBeside = 16 * 1024;
 
 class RigMemory : public testing::TestWithParam<Bomb> {};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // One Rig in eight threads gives each thread the same poses as alone. The preset `tsan` runs the
-// same tests with the thread sanitizer.
+// tests of OneRig with the thread sanitizer.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -35,7 +35,8 @@ Rig full_rig(const CompileOptions& options) {
   return std::move(rig).value();
 }
 
-// Frame n of an animation in which a jaw moves and a quaternion rotates.
+// The raw controls of make_full_face in frame n of an animation: a jaw moves, and a quaternion
+// rotates.
 std::vector<float> frame(std::size_t n) {
   const float jaw = static_cast<float>(n % 5) / 4.0f;
   const float side = static_cast<float>(n % 3) * 0.48f;  // 0, 0.48, 0.96
@@ -87,7 +88,8 @@ TEST(OneRig, GivesEveryWorkspaceWhatItGivesOneAlone) {
 TEST(OneRig, GivesEveryInstanceItsOwnPast) {
   for (const CompileOptions& way : ways()) {
     const Rig rig = full_rig(way);
-    // The last pose of an Instance that evaluates kTurns frames from `first` on.
+    // The last pose of an Instance that evaluates kTurns frames from `first` on, and then frame
+    // `first` again.
     const auto film = [&rig](std::size_t first) {
       Instance face(rig);
       face.set_mask(0, static_cast<float>(first % 2));
@@ -160,7 +162,8 @@ TEST(OneRig, SealsItsBlockOnceWhoeverAsksFirst) {
   EXPECT_EQ(rig.block().data(), Rig(rig).block().data());
 }
 
-// The parts of a DirectFace for the rig of make_full_face, with two meshes of several blocks.
+// The parts of a DirectFace for the rig of make_full_face, with two equal meshes, each of six
+// blocks of at most kSkinBlock vertices.
 FaceParts many_blocks(const Rig& rig) {
   constexpr std::uint32_t kVertices = 5 * kSkinBlock + 7;
   FaceParts parts;
@@ -192,7 +195,7 @@ FaceParts many_blocks(const Rig& rig) {
 
 TEST(OneRig, GivesFacesInAnyNumberOfThreadsTheVerticesOfEachAlone) {
   const Rig rig = full_rig({});
-  std::vector<std::vector<std::vector<float>>> all;  // for each number of threads, the meshes
+  std::vector<std::vector<std::vector<float>>> all;  // [number of threads][2 * face + mesh]
   for (const std::size_t threads : {1u, 2u, 5u, 8u}) {
     std::vector<std::unique_ptr<DirectFace>> faces;
     std::vector<DirectFace*> pointers;
@@ -215,7 +218,7 @@ TEST(OneRig, GivesFacesInAnyNumberOfThreadsTheVerticesOfEachAlone) {
     all.push_back(out);
   }
   for (const auto& out : all) EXPECT_EQ(out, all[0]);
-  EXPECT_NE(all[0][0], all[0][2]);  // a different frame
+  EXPECT_NE(all[0][0], all[0][2]);  // face 1 shows another frame than face 0
 }
 
 // This test is not part of OneRig, which the tsan preset runs, because exceptions pass between

@@ -53,7 +53,7 @@ core::Result<Surface> surface_of(const dna::Dna& dna, std::uint32_t lod = 0) {
   return make_surface(dna, std::make_shared<rig::Rig>(must_compile(dna)), lod);
 }
 
-/// The position of a vertex, computed by hand from the two raw controls. The elbow is at (11, 2, 2)
+/// The position of a vertex, computed by hand from the two raw controls. The elbow is at (11, 2, 0)
 /// in the neutral pose.
 std::array<double, 3> expected(std::size_t vertex, double turn, double lift) {
   const double c = std::cos(90 * kRadians * turn), s = std::sin(90 * kRadians * turn);

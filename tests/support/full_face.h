@@ -173,9 +173,9 @@ inline dna::TwistSwingSetup setup(std::uint16_t axis) {
 
 }  // namespace full_face
 
-/// A face with two LODs, three joints, two meshes, and one or two of everything else, in all layers
-/// up to version 2.8. Its behavior reads only raw and corrective controls, so that it remains
-/// complete when it is written for older versions.
+/// A face with two LODs, three joints, five raw controls, two meshes, and one or two of everything
+/// else, in all layers up to version 2.8. Its behavior reads only raw and corrective controls, so
+/// that it remains complete when it is written for older versions.
 inline dna::Dna make_full_face() {
   dna::Dna dna;
   dna.descriptor = full_face::descriptor();

@@ -18,7 +18,9 @@ namespace risorius::testing_support {
 using Bytes = std::vector<std::uint8_t>;
 
 /// Sizes of a generated head. LOD l has its own mesh with vertices >> l vertices and channels >> l
-/// blend shape channels. One more mesh belongs to every LOD and has targets for all channels.
+/// blend shape channels; each of its blend shape targets has deltas >> l deltas. One more mesh
+/// belongs to every LOD: it has `vertices` vertices, and targets of `deltas` deltas for all
+/// channels.
 struct HeadSizes {
   std::uint16_t lods = 4, joints = 60, raw = 100, channels = 32;
   std::uint32_t vertices = 6000, deltas = 1500, joint_groups = 8;
@@ -83,8 +85,8 @@ inline dna::BlendShapeTarget make_target(std::uint16_t channel, std::uint32_t de
   return t;
 }
 
-/// A mesh of quads. Vertex v has weights on three to six consecutive joints from joint v on; joint
-/// 0 follows the last one.
+/// A mesh of quads. Vertex v has weights on three to six consecutive joints from joint v % joints
+/// on; joint 0 follows the last one.
 inline dna::Mesh make_head_mesh(std::uint32_t vertices, std::uint16_t joints,
                                 std::uint16_t channels, std::uint32_t deltas) {
   dna::Mesh m;

@@ -20,20 +20,20 @@ from typing import NamedTuple
 from . import tables
 
 _SLOT = re.compile(r"\{(\w+)\}")
-_DEEPEST = 4  # messages inside a message: a file, a row, a cell, a reason
+_DEEPEST = 4  # most levels of messages inside a message: a file, a row, a cell, a reason
 _MOST_PLACES = 5  # most places, such as a file and a line, before a message
-_AND = " and "  # the row with the word before the last name of a list
-_LISTS = ("controls", "materials", "meshes", "names")  # values that may be such lists
-_SEVERAL = "changes"  # a value with a list of texts that have rows of their own
-_LONGEST = 1000  # letters of a message; the time grows faster than its length
+_AND = " and "  # key of the row that translates the word before the last name of a list
+_LISTS = ("controls", "materials", "meshes", "names")  # values that may be lists of names
+_SEVERAL = "changes"  # value with texts between commas, each of which has its own row
+_LONGEST = 1000  # most characters of a translated message: the time grows faster than its length
 
 
 class _Row(NamedTuple):
     pattern: re.Pattern[str]
     piece: str
-    """The longest text between its values; a message without it does not match."""
+    """The longest English text between two values; a message without this text does not match."""
     letters: int
-    """Letters beside the values."""
+    """Number of letters of the English text outside the values."""
     translation: str
 
 
@@ -57,7 +57,8 @@ def local(message: str, language: str) -> str:
 def best(message: str, language: str, depth: int) -> _Found:
     """Find the translation that translates the most letters of a message.
 
-    A message of a single word stays as it is, because the word is a name or a number.
+    A message of a single word stays as it is, because the word is a name or a number. So do
+    messages that no row matches, that are too long, or that are parts of too many messages.
 
     Args:
         message: the English message.
@@ -84,7 +85,17 @@ def best(message: str, language: str, depth: int) -> _Found:
 
 
 def _value(name: str, value: str, language: str, depth: int) -> _Found:
-    """Translate a value of a message. In a list of names, only the "and" is translated."""
+    """Translate a value of a message.
+
+    In a value for `_SEVERAL`, each text between commas is translated. In a list of names without a
+    translation, only the "and" is translated.
+
+    Args:
+        name: name of the value in the row's template.
+        value: the value's text in the message.
+        language: a language of `tables.languages`, not "".
+        depth: number of messages around the value.
+    """
     if name == _SEVERAL:
         each = [best(part, language, depth) for part in value.split(", ")]
         return _Found(", ".join(f.text for f in each), sum(f.letters for f in each))

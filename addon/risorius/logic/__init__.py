@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names, groups of controls, coordinate spaces and plans of Blender data.
+"""The add-on's calculations: plans of Blender data, animation, face boards, textures and names.
 
 The code imports neither bpy nor the native module, so it runs without Blender.
 """

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds characters as Blender objects from plans, and writes their poses to these objects."""
+"""Builds, evaluates, animates, bakes, exports and repairs characters as objects of Blender."""

@@ -19,12 +19,15 @@ else:
 class RunsBeside(_Base):
     """Base of operators with a background task; they define `finish`, `shown` and `cancelled_text`.
 
-    In background mode and in the redo panel, the operator waits for the result instead.
+    In scripts, in Blender's background mode and in the redo panel, the operator waits for the
+    result instead.
     """
 
     def wait_beside(self) -> None:
-        """Let the next `begin` run its task in the background. `invoke` calls this; an `execute`
-        without `invoke`, as in a script, waits for the result."""
+        """Let the next `begin` run its task beside the interface, if Blender has one.
+
+        `invoke` calls this. An `execute` without `invoke`, as in a script, waits for the result.
+        """
         self._beside = not bpy.app.background
 
     def begin(self, context: Context, task: Task) -> Result:
@@ -50,7 +53,9 @@ class RunsBeside(_Base):
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
         """Blender calls this with each event: Esc cancels, the timer shows progress and finishes.
 
-        Args: context, event  of the operator.
+        Args:
+            context: context of the operator.
+            event: the current event.
         """
         if event.type == "ESC":
             self.cancel(context)
@@ -81,7 +86,11 @@ class RunsBeside(_Base):
         raise NotImplementedError
 
     def shown(self, share: int) -> str:
-        """The text of the status bar. Args: share  finished part of the task, 0 to 100."""
+        """The text of the status bar.
+
+        Args:
+            share: finished part of the task in per cent, 0 to 100.
+        """
         raise NotImplementedError
 
     def cancelled_text(self) -> str:

@@ -26,7 +26,14 @@ MODES = (
             "posed. The face uses Live if needed"
         ),
     ),
-    ("LIVE", "Live", "One shape key per mesh below the armature modifier; bones are posed"),
+    (
+        "LIVE",
+        "Live",
+        (
+            "Each mesh has one shape key, and its armature modifier acts after the key; bones "
+            "are posed"
+        ),
+    ),
     (
         "KEYS",
         "Shape Keys",
@@ -88,7 +95,12 @@ def shown_progress(context: Context) -> Iterator[Callable[[float], None]]:
 
 
 def active_controls(context: Context) -> ArmatureObject | None:
-    """The control armature of the active face; None without a face or without the native module."""
+    """The control armature of the active face.
+
+    Returns:
+        None if no face is active, if the face has lost the armature, or if the native module cannot
+        be used.
+    """
     rig = None if native.problem() else parts.active_rig(context)
     return parts.controls_of(rig) if rig is not None else None
 
@@ -109,7 +121,8 @@ def face_controls(context: Context) -> ArmatureObject:
     """The control armature of the active face, for operators whose poll requires a face.
 
     Raises:
-        FaceError: no face is active.
+        FaceError: no face is active, the active face has lost its control armature, or the native
+            module cannot be used.
     """
     controls = active_controls(context)
     if controls is None:
@@ -127,9 +140,9 @@ class FaceOperator(OperatorBase):
     """Base of operators on the active face. Class attributes define which faces are suitable."""
 
     bl_options = {"REGISTER", "UNDO"}
-    whole_face = True  # the face needs its control armature and its DNA
-    baked_too = False  # faces with baked actions are accepted
-    by_sliders = False  # a face that its face board moves is rejected
+    whole_face = True  # whether the face needs its control armature and its DNA
+    baked_too = False  # whether faces with baked actions are accepted
+    by_sliders = False  # whether a face that its face board moves is rejected
 
     @classmethod
     def poll(cls, context: Context) -> bool:

@@ -36,7 +36,7 @@ class Ruler:
         preferences, region = context.preferences, context.region
         width: float = _SIDEBAR
         if region is not None and region.type == "UI" and region.width > 1:
-            width = region.width / (preferences.system.ui_scale or 1.0)  # 0 without a window
+            width = region.width / (preferences.system.ui_scale or 1.0)  # scale 0: no window
         self._room = (width - _EDGES) * share - _MARGIN
         self._points = preferences.ui_styles[0].widget.points
         self._font = preferences.view.font_path_ui
@@ -116,7 +116,8 @@ def say(text: str, **values: object) -> str:
 
     Args:
         text: English text of the table with {names} of values, or a Sentence.
-        values: name -> number, name or Sentence; only Sentences are translated.
+        values: name -> number, name or Sentence. Sentences are translated, and so are error
+            messages of the package in values named error, reason, said, trouble or why.
     """
     follow_language()
     if isinstance(text, Sentence):
@@ -159,7 +160,7 @@ def local(text: str) -> str:
 
 
 def mark(text: str) -> str:
-    """Mark a label that Blender itself translates, for the test of our translation tables."""
+    """Mark a text that Blender or a later `say` translates, for the test of our tables."""
     return text
 
 

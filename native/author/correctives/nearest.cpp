@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Finds the triangle that is nearest to a point or that a ray meets, in a tree of boxes.
 #include "author/correctives/nearest.h"
 
 #include <Eigen/Geometry>
@@ -25,7 +26,7 @@ bool passes(const Vec3& from, const Vec3& inverse, const Vec3& low, const Vec3& 
 }
 
 /// Where a ray meets a triangle: the barycentric coordinates of b and c, and the distance from
-/// `from` in lengths of `way`. Nothing if the ray misses the triangle.
+/// `from` in lengths of `way`. Nullopt if the ray misses the triangle or is parallel to it.
 /// Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997)
 std::optional<Vec3> meeting(const Vec3& from, const Vec3& way, const Vec3& a, const Vec3& b,
                             const Vec3& c) {

@@ -34,7 +34,8 @@ class Nearest {
   /// The first triangle that a ray meets, at its front or back, if it is nearer than `reach`.
   /// In: direction  of length 1
   std::optional<Hit> first_hit(const Vec3& from, const Vec3& direction, double reach) const;
-  /// The nearest triangle that `takes` accepts and that is nearer than `reach`.
+  /// The triangle nearest to p among those nearer than `reach` for whose index `takes` returns
+  /// true.
   std::optional<Hit> find(const Vec3& p, double reach,
                           core::FunctionRef<bool(std::uint32_t)> takes) const;
 

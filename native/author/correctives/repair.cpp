@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Repairs a posed skin: finds the displacement of its vertices that removes faults (vertices
+// inside a solid or the skin itself, stretched faces, folded edges) beyond the allowed ones. A
+// pose consists of parts, such as the expressions in it; undoing a part takes its motion back.
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
@@ -73,7 +76,7 @@ struct Work {
   }
 };
 
-/// The result of one check: contacts, faults and their sums.
+/// The result of one check: contacts, faults, and the sums of the faults beyond the allowed ones.
 struct Look {
   std::vector<Contact> contacts;
   SkinFaults faults;
@@ -113,7 +116,9 @@ std::vector<std::uint32_t> fault_vertices(const Work& work, const Look& look) {
   return out;
 }
 
-/// Lets the vertices move that are within SkinChecker::kAround of a fault.
+/// Lets vertices move: adds to work.active all vertices that are less than SkinChecker::kAround mm,
+/// in the neutral pose, from a vertex with a fault.
+/// In: faults  vertices with a fault
 void mark(Work& work, const std::vector<std::uint32_t>& faults) {
   const auto& neutral = work.topology.neutral;
   work.place.assign(neutral.size(), Work::kStill);
@@ -201,8 +206,10 @@ void ask_folded(Work& work, const Look& look, const std::vector<Vec3>& now) {
   }
 }
 
-/// Solves one sparse linear system: the smoothest displacement that meets the goals of places,
-/// edges and flatness in the least squares sense.
+/// Solves one sparse linear system: the smoothest change of a displacement that meets the goals of
+/// places, edges and flatness in the least squares sense.
+/// In:     base    [V] the displacement in mm that is changed
+/// In/out: work.x  the changed displacement; stays as it is if the system has no solution
 void solve(Work& work, const std::vector<Vec3>& base) {
   const Topology& topology = work.topology;
   const auto count = static_cast<Eigen::Index>(work.active.size());
@@ -309,9 +316,11 @@ struct Best {
   }
 };
 
-/// Undoes a part of the pose near the pose's faults, more in each round, until no fault is left.
-/// In: undo   [V] the displacement in mm that undoes the part everywhere
-///     reach  mm: vertices at least this far from every fault keep their whole motion
+/// Undoes a part of the pose near the pose's faults, more in each round, until no fault is left or
+/// kFades rounds are done.
+/// In:     undo   [V] the displacement in mm that undoes the part everywhere
+///         reach  mm: vertices at least this far from every fault keep their whole motion
+/// In/out: best   gets the displacement of a round that is cheaper
 void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {
   const auto& neutral = work.topology.neutral;
   std::map<std::uint32_t, double> seeds;
@@ -439,7 +448,8 @@ Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& fault
 
 /// Whether the best repair makes nothing worse in the whole skin. A full check is needed because
 /// the moved vertices may enter skin outside the region.
-/// In: allowed  the faults that the caller allows
+/// In:     allowed    the faults that the caller allows
+/// In/out: best.sums  if true: the faults beyond `allowed` after the repair
 bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best) {
   work.x = best.x;
   const Look look = look_at(work, work.topology.whole);
@@ -448,7 +458,9 @@ bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best
   return true;
 }
 
-/// Limits each allowed depth and stretch to the largest depth and stretch of the pose.
+/// Sets work.deepest and work.widest to the largest depth and stretch of the pose before the
+/// repair, and limits each allowed depth and stretch to them.
+/// In: first  faults of the pose before the repair
 void limit(Work& work, const SkinFaults& first) {
   work.deepest = std::ranges::max(first.depth);
   work.widest = std::max(SkinChecker::kStretch, std::ranges::max(first.stretch));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Prepares a skin for the search for faults, and finds and sums the faults of a pose.
 #include "author/correctives/topology.h"
 
 #include <Eigen/Geometry>
@@ -150,8 +151,9 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
   }
 }
 
-/// Finds contacts of the skin with itself: upper and lower lip, upper and lower lid. A vertex that
-/// lies behind the other surface in the neutral pose is left out, because the skin is thin there.
+/// Finds contacts of the skin with itself: upper and lower lip, upper and lower lid. A triangle
+/// behind which the vertex lies in the neutral pose already is left out, because the skin is thin
+/// there.
 void touch_skin(const Topology& topology, const Region& region, const std::vector<Vec3>& skin,
                 std::vector<Contact>& best) {
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);

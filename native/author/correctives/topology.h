@@ -29,7 +29,7 @@ struct Topology {
   Skin skin;
   std::vector<Vec3> neutral;           // [V] mm
   std::vector<Triangle> triangles;     // fans of the faces
-  std::vector<std::uint32_t> face_of;  // [triangles]
+  std::vector<std::uint32_t> face_of;  // [triangles] index of the face of a triangle
   std::vector<Hinge> hinges;           // inner edges
   std::vector<double> face_areas;      // [F] mm2, neutral
   std::vector<double> vertex_areas;    // [V] mm2, neutral
@@ -50,9 +50,9 @@ struct Contact {
   std::uint32_t vertex = 0;
   float depth = 0.0f;  // mm
   Vec3 normal = Vec3::Zero();
-  bool is_skin = false;
-  Triangle other{};  // of the skin, if is_skin
-  Vec3 share = Vec3::Zero();
+  bool is_skin = false;       // inside the skin, not inside a solid
+  Triangle other{};           // if is_skin: vertices of the touched triangle of the skin
+  Vec3 share = Vec3::Zero();  // if is_skin: barycentric coordinates of the touched point
 };
 
 /// The positions of a skin and its solids in one pose, in mm.
@@ -72,7 +72,8 @@ class SolidSurfaces {
 
 /// The region of all vertices that can be seen, and all triangles.
 Region whole_region(const Topology& topology);
-/// The region of the given vertices and of all triangles near them in the pose.
+/// The region of those of the vertices that can be seen, and of the triangles with a corner, in the
+/// pose, at most 12 mm outside of the bounding box of the vertices.
 Region region_around(const Topology& topology, const Placed& pose,
                      const std::vector<std::uint32_t>& vertices);
 
@@ -90,22 +91,25 @@ SkinFaults find_faults(const Topology& topology, const std::vector<Vec3>& skin,
 
 FaultSums sum_faults(const Topology& topology, const SkinFaults& faults, const SkinFaults& allowed);
 
-/// Whether a vertex is deeper, a face more stretched or an edge more folded than allowed.
+/// Whether vertex v is more than kDepth deeper than allowed.
 inline bool is_deep(const SkinFaults& f, const SkinFaults& allowed, std::size_t v) {
   return f.depth[v] > allowed.depth[v] + SkinChecker::kDepth;
 }
+/// Whether a face of visible size is stretched more than kStretch and more than allowed.
 inline bool is_stretched(const Topology& t, const SkinFaults& f, const SkinFaults& allowed,
                          std::size_t face) {
   constexpr double kSmallest = 0.5;  // mm2: a smaller face cannot be seen
   return f.stretch[face] > SkinChecker::kStretch && f.stretch[face] > allowed.stretch[face] &&
          t.face_areas[face] > kSmallest;
 }
+/// Whether the two faces at an edge lie on each other (below kFold), but not in `allowed`.
 inline bool is_folded(const SkinFaults& f, const SkinFaults& allowed, std::size_t hinge) {
   return f.fold[hinge] < SkinChecker::kFold && allowed.fold[hinge] >= SkinChecker::kFold;
 }
 
-/// Repairs a pose as SkinChecker::repair does.
-/// In: without  the positions of the skin without each of the pose's parts
+/// Finds a displacement of the vertices that removes the faults of a pose beyond `allowed`, or as
+/// many as possible; see SkinChecker::repair.
+/// In: without  [parts][V] mm, the positions of the skin without each of the pose's parts
 Repair repair_pose(const Topology& topology, const Placed& pose, const SkinFaults& allowed,
                    const std::vector<std::vector<Vec3>>& without);
 

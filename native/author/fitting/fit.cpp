@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Fits joints, weights and joint motions to the expressions of a mesh, in rounds: motions for
+// given weights, then weights for given motions.
 #include "author/fit.h"
 
 #include <Eigen/Geometry>
@@ -24,12 +26,13 @@ using detail::Vec3;
 
 constexpr int kRoundsOfWeights = 12;
 constexpr std::size_t kRoundsOfMotions = 8;  // Gauss-Newton steps
-// Shares of least_effect below which a joint leaves an expression. There are two steps, so that
-// other joints take over before more joints leave.
+// Two steps: a joint leaves an expression in which it moves every vertex by less than
+// FitOptions::least_effect times this factor. There are two, so that other joints take over before
+// more joints leave.
 constexpr double kThinning[] = {0.5, 1.0};
 /// In the last rounds, joints are placed at their pivots and momentum is 0, so that its overshoot
-/// is corrected. In earlier rounds a joint is in the middle of its vertices, because a rotation
-/// about a far pivot is solved less exactly.
+/// is corrected. In earlier rounds a joint is in the middle of its vertices (with `bound` only in
+/// the first half of the rounds), because a rotation about a far pivot is solved less exactly.
 constexpr std::size_t kLastRounds = 4;
 constexpr double kMomentum = 0.6;
 /// How many of the nearest joints a vertex tries when joints cannot move. The joints it needs may
@@ -51,7 +54,8 @@ std::vector<double> worst_squares(const Problem& problem, const std::vector<floa
   return out;
 }
 
-/// Raises the importance of vertices whose largest error is above average.
+/// Raises the importance of vertices whose largest error is above average, and lowers the others'.
+/// In: power  FitOptions::emphasis; 0: importance stays as it is
 void emphasise(Problem& problem, const std::vector<float>& left, double power) {
   if (power <= 0.0) return;
   std::vector<double> worst = worst_squares(problem, left);
@@ -149,7 +153,8 @@ struct Best {
   }
 };
 
-/// Removes joints from expressions in which they do little; the other joints take over.
+/// Removes joints from the expressions in which they move every vertex by less than least_effect
+/// (in the shapes' unit); the other joints take over.
 void thin_out(const Problem& problem, double least_effect, State& state, std::vector<float>& left) {
   for (const double share : kThinning) {
     detail::leave_expressions(problem, state, share * least_effect * problem.scale);
@@ -161,7 +166,10 @@ void thin_out(const Problem& problem, double least_effect, State& state, std::ve
   }
 }
 
-/// Adds new joints without motions, each in the middle of its vertices or at its pivot.
+/// Adds new joints without motions, each in the middle of its vertices or at its pivot, and sets
+/// the weights of all joints.
+/// In:    at  [new joints] index of the joint's pivot, or kInTheMiddle
+/// Fails: kInvalidIndex, kInvalidLength, kInvalidValue (at, weights)
 core::Status take_new_joints(const Problem& problem, const StartWeights& weights,
                              const std::vector<std::uint32_t>& at, State& state) {
   const std::size_t given = state.joints.size();

@@ -51,8 +51,8 @@ Joint make_joint(const Problem& problem, const Vec3& position, std::uint32_t mir
   return out;
 }
 
-/// Gives a new joint a share of the weights of the vertices around it: 0.7 at the joint, falling to
-/// 0 at `reach`.
+/// Gives a new joint a weight of the vertices around it: 0.7 at the joint, falling to 0 at the
+/// distance `reach`. The other weights of a vertex are scaled to the rest of its sum.
 void take_weights(const Problem& problem, State& state, std::uint32_t joint, double reach) {
   const Vec3& centre = state.joints[joint].position;
   for (std::size_t v = 0; v < problem.vertices; ++v) {

@@ -179,8 +179,9 @@ class System {
 
   /// The lower half of the stiffness matrix of some joints in their present rotations, as a dense
   /// matrix.
-  /// In: at     [joints] the joint's index among these joints, ascending, or -1
-  ///     count  number of these joints
+  /// In: at           [joints] the joint's index among these joints, ascending, or -1
+  ///     count        number of these joints
+  ///     turn(joint)  the joint's rotation
   template <class Turn>
   Eigen::MatrixXd among(const std::vector<int>& at, int count, const Turn& turn) const {
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(6 * count, 6 * count);
@@ -320,7 +321,7 @@ void find_residual(const Problem& problem, const State& state, std::vector<float
 
 namespace {
 
-/// Squared error of each expression, weighted by importance.
+/// [E] the squared residuals of each expression, summed over vertices weighted by importance.
 std::vector<double> energies(const Problem& problem, const std::vector<float>& left) {
   const std::size_t count = problem.expressions;
   std::vector<double> out(count);
@@ -336,6 +337,7 @@ std::vector<double> energies(const Problem& problem, const std::vector<float>& l
 }
 
 /// Takes the step in each expression, and shortens it in expressions whose error grows.
+/// In:  step  [6 * columns, E] rotation vector and translation of each joint that is not given
 /// Out: left  the new residual
 void take_step(const Problem& problem, State& state, const System& system,
                const Eigen::MatrixXd& step, std::vector<float>& left) {
@@ -377,7 +379,8 @@ void take_step(const Problem& problem, State& state, const System& system,
   }
 }
 
-/// The step of an expression in which some joints take no part.
+/// The step of expression e, in which some joints take no part; the step of these joints is 0.
+/// In: right  [6 * columns] torque and force on each joint that is not given
 Eigen::VectorXd solve_few(const State& state, const System& system, std::size_t e,
                           const Eigen::VectorXd& right) {
   std::vector<int> at(state.joints.size(), -1);

@@ -53,8 +53,8 @@ void leave_expressions(const Problem& problem, State& state, double least) {
 
 namespace {
 
-/// The pivot whose expressions hold the largest share of a joint's motion, or -1 if no share
-/// exceeds 0.3.
+/// The pivot whose expressions have the largest share of a joint's squared motion, or -1 if no
+/// pivot has a share above 0.3 or joints are not placed at pivots.
 int pivot_of(const Problem& problem, const Joint& joint,
              const std::vector<ByJoint::Entry>& weights) {
   if (problem.pivots.empty() || !problem.to_pivots) return -1;

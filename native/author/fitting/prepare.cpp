@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Converts the shapes, the given joints and the pivots of a fit to the fit's own units.
 #include "author/fitting/prepare.h"
 
 #include <Eigen/Geometry>
@@ -130,7 +131,9 @@ Joint take_joint(const Problem& problem, const GivenJoint& given, std::uint32_t 
   return out;
 }
 
-/// Pairs the given joints, and fills their motions in the added mirrored expressions.
+/// Pairs each given joint with the joint on the other side (itself if there is none), and fills the
+/// motions of the given joints in the added mirrored expressions.
+/// In: own  number of expressions without the added ones
 void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
                 std::vector<Joint>& joints, std::size_t own) {
   if (problem.mirror.empty()) return;

@@ -22,7 +22,8 @@ void take_pivots(const std::vector<Pivot>& pivots, Problem& problem);
 /// added. The first joint without motion gets all vertices. Also fills problem.nearest_given.
 /// In: own  number of expressions without the added mirrored ones
 State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t own);
-/// Sets the initial weights. Fails: see fit_weights
+/// Sets the initial weights of the vertices; weights without influences change nothing.
+/// Fails: kInvalidLength, kInvalidIndex (a joint), kInvalidValue (a weight)
 core::Status take_start(const StartWeights& start, State& state);
 
 }  // namespace risorius::author::detail

@@ -35,7 +35,7 @@ struct Problem {
     std::size_t mirrored = 0;       // the pivot of the other side, itself in the middle
   };
   std::vector<Pivot> pivots;
-  bool to_pivots = false;  // whether joints are placed at their pivots
+  bool to_pivots = false;  // true: move_joints may place joints at pivots
   double smoothness = 0.0;
   /// The share of a weight's last change that is added to the weight again, because consecutive
   /// rounds mostly change it in the same direction.
@@ -62,7 +62,7 @@ struct Joint {
   std::vector<Mat3> rotations;     // [E]
   std::vector<Vec3> translations;  // [E]
   std::vector<Affine> motions;     // [E] computed from the two above
-  // [E] the joint takes no part in the expression; empty: it takes part in all.
+  // [E] true: the joint takes no part in the expression; empty: it takes part in all.
   std::vector<bool> idle;
 
   bool is_idle(std::size_t expression) const { return !idle.empty() && idle[expression]; }
@@ -83,19 +83,22 @@ struct State {
 /// The best weights for the present motions, plus momentum if it is set.
 void solve_weights(const Problem& problem, State& state);
 /// The best motions for the present weights.
-/// In: left  the residual of find_residual
+/// In/out: left  the residual of find_residual, before and after
 void solve_motions(const Problem& problem, State& state, std::vector<float>& left);
 /// Removes each joint for good from the expressions in which it moves every vertex by less than
-/// `least`.
+/// `least`. Given joints stay; a joint and its mirror leave an expression together.
 void leave_expressions(const Problem& problem, State& state, double least);
 /// Computes the displacements that the joints do not reproduce.
 /// Out: left  [V][3][E] the shapes' displacements minus the displacements by the joints
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
-/// Adds joints where the present ones leave the largest error, until there are `count`.
+/// Adds joints where the present ones leave the largest error, until there are `count` joints in
+/// all or no vertex has an error and room for a joint.
+/// In: left  the residual of find_residual
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,
                 std::size_t count);
-/// Moves the neutral position of each joint to the middle of its vertices, or to the pivot of the
-/// expressions in which it mostly moves. Given joints do not move.
+/// Moves the neutral position of each joint to the middle of its vertices, or, if
+/// problem.to_pivots, to the pivot of the expressions in which it mostly moves. Given joints do not
+/// move.
 void move_joints(const Problem& problem, State& state);
 
 void rest(Joint& joint, std::size_t expressions);

@@ -23,7 +23,8 @@ constexpr double kLeastOnward = 0.1;  // share of a weight that momentum leaves 
 // At most kCandidates rows, so that Eigen allocates no memory.
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCandidates, kCandidates>;
 using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCandidates, 1>;
-using Products = std::array<double, 10>;  // of two joints: symmetric part of sum_e Y^T Z
+// Of two joints with the motions Y and Z: the symmetric part of Y^T Z, summed over expressions.
+using Products = std::array<double, 10>;
 
 Products products(const Joint& a, const Joint& b) {
   Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();

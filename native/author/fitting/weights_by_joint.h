@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Private to native/author.
+// The weights of a fit sorted by joint. Private to native/author.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace risorius::author::detail {
 
-/// The weights sorted by joint.
+/// The weights of all vertices, listed for each joint: of[joint] has the joint's vertices.
 struct ByJoint {
   struct Entry {
     std::uint32_t vertex;

@@ -109,7 +109,8 @@ float* target_argument(const py::handle& value, py::ssize_t vertices,
   return reinterpret_cast<float*>(address);
 }
 
-/// The arguments of evaluate_faces, and the Python objects that keep their memory alive.
+/// The arguments of evaluate_faces or deform_faces, and the Python objects that keep their memory
+/// alive.
 struct Request {
   std::vector<FacePtr> faces;
   std::vector<rig::FaceFrame> frames;
@@ -195,7 +196,7 @@ struct Request {
     rig::evaluate_faces(all, frames, threads);
   }
 
-  // The numbers of the meshes whose vertices the evaluation wrote.
+  // The indices of the meshes of face f whose vertices the evaluation wrote.
   py::tuple written(std::size_t f) const {
     py::list meshes;
     for (const rig::Target& t : frames[f].targets) {

@@ -21,7 +21,7 @@ inline constexpr std::size_t kMostBlockFrames = 4096;
 inline constexpr std::uint8_t kCodedBlock = 0, kStoredBlock = 1, kStoredChunk = 0xFF;
 
 /// How a block describes a curve: all zeros, one constant value, a repetition of an earlier curve,
-/// or a coded chunk. Neighbouring constant curves share an entry.
+/// or a coded chunk. Neighbouring curves with the same constant value share an entry.
 enum class PartKind : std::uint8_t { kZero, kConstant, kRepeated, kCoded };
 
 /// Curves [controls, frames]; the rows begin `stride` values apart.
@@ -41,8 +41,9 @@ void encode_curves(const BlockCurves& curves, Bytes& out);
 /// The curves of a block. A curve is decoded only when it is requested.
 class EncodedCurves {
  public:
-  /// Reads the table of parts. bytes must outlive the result.
-  /// Fails: kInvalidValue, kTruncated; the error's offset counts from the first of the bytes
+  /// Reads the prefix codes of a block and the kind of each curve, but decodes no curve.
+  /// In:    bytes  the result of encode_curves; they must outlive the result
+  /// Fails: kInvalidValue, kInvalidLength; the error's offset counts from the first of the bytes
   static core::Result<EncodedCurves> open(View bytes, std::size_t controls, std::size_t frames);
 
   EncodedCurves(EncodedCurves&&) noexcept;
@@ -51,10 +52,12 @@ class EncodedCurves {
 
   /// Writes the frames of controls to out [controls.size(), frames]; rows are `stride` values
   /// apart.
-  /// Fails: kInvalidValue. In: controls of this block
+  /// In:    controls  indices of controls of this block
+  /// Fails: kInvalidValue
   core::Status decode(std::span<const std::uint32_t> controls, float* out,
                       std::size_t stride) const;
-  /// Whether a control has one value in the whole block. Out: value  this value; set only if true
+  /// Whether the block describes the curve of a control as one constant value. False for all
+  /// controls of a kStoredBlock. Out: value  this value; set only if true
   bool is_resting(std::size_t control, float& value) const {
     if (parts_[control].kind != Part::kConstant) return false;
     value = std::bit_cast<float>(parts_[control].bits);
@@ -66,8 +69,8 @@ class EncodedCurves {
   struct Pending;
   struct Part {
     enum Kind : std::uint8_t { kConstant, kCoded, kStored } kind = kConstant;
-    bool is_near_end = false;          // its bytes lie in tail_
-    std::uint32_t bits = 0;            // of kConstant
+    bool is_near_end = false;          // its bytes are read from tail_
+    std::uint32_t bits = 0;            // of kConstant: the bits of the float
     std::size_t offset = 0, size = 0;  // of the bytes of the other kinds
   };
   EncodedCurves();
@@ -82,7 +85,7 @@ class EncodedCurves {
   std::size_t frames_ = 0;
   std::vector<Part> parts_;
   std::unique_ptr<Tables> tables_;
-  Bytes tail_;  // a copy of the bytes from tail_begin_ on
+  Bytes tail_;  // a copy of the bytes from tail_begin_ on, and spare bytes after them
   std::size_t tail_begin_ = 0;
 };
 

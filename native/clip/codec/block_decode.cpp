@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Decodes the curves of a block. A coded curve is a chunk of bytes: the order of its predictor,
+// the first value, then tokens (a prefix code and extra bits) for the other values.
 #include <algorithm>
 #include <array>
 #include <cstring>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Encodes curves as a block: chooses the kind of each curve and its predictor, and the prefix
+// codes of the symbols.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -73,7 +75,8 @@ Coded best_tokens(std::span<const float> curve) {
 
 // The prefix codes of a block, and the symbols that choose between them.
 struct Codes {
-  std::vector<std::uint8_t> bounds;  // the largest preceding symbol of each code except the first
+  // bounds[i] is the largest preceding value symbol of code i + 1; the last code has no bound.
+  std::vector<std::uint8_t> bounds;
   std::vector<Code> codes;
 
   std::size_t after(std::uint32_t symbol) const {

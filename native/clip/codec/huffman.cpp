@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Computes prefix codes, and writes and reads the lengths of their codes.
 #include "clip/codec/huffman.h"
 
 #include <algorithm>
@@ -27,8 +28,8 @@ bool Code::assign() {
 
 namespace {
 
-// Computes the depths of the leaves of a Huffman tree over the symbols that occur. Out: the largest
-// depth
+// Sets code.lengths to the depths of the leaves of a Huffman tree over the symbols that occur.
+// In: counts  how often each symbol occurs. Out: the largest depth
 std::uint8_t measure(std::span<const std::uint32_t> counts, Code& code) {
   struct Node {
     std::uint64_t weight;

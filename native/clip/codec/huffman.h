@@ -22,8 +22,8 @@ struct Code {
   bool assign();
 };
 
-/// The prefix code that needs the fewest bits for a text in which symbol i occurs counts[i] times,
-/// with no code longer than kLongestCode.
+/// The Huffman code for a text in which symbol i occurs counts[i] times. If it has a code longer
+/// than kLongestCode bits, a code within this limit, which needs slightly more bits.
 Code make_code(std::span<const std::uint32_t, kMostSymbols> counts);
 
 /// Appends the code lengths of all symbols of all codes, half a byte each. After a length of 0

@@ -13,8 +13,8 @@ namespace risorius::clip {
 /// values.
 inline constexpr int kOrders = 5;
 
-/// Maps the bits of a float to an integer so that ascending floats give ascending integers. It is
-/// its own inverse.
+/// Maps the bits of a float to an integer so that ascending floats give ascending integers if these
+/// are read as int32. The function is its own inverse.
 inline std::uint32_t in_order(std::uint32_t bits) {
   return bits ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(bits) >> 31) >> 1;
 }

@@ -20,8 +20,9 @@ inline constexpr std::uint32_t kRest = 65;
 inline constexpr std::uint32_t kRests = 13;  // up to kMostBlockFrames
 static_assert(kRest + kRests <= kMostSymbols);
 
-/// A block has up to this many prefix codes. The previous symbol chooses the code: code 0 after a
-/// repetition; after a value, the first code i > 0 whose bounds[i] is at least the value's symbol.
+/// A block has up to this many prefix codes. The previous symbol chooses the code: code 0 at the
+/// start and after a repetition; after a value, the first code i > 0 for which bounds[i - 1] is at
+/// least the value's symbol, or the last code if there is none.
 inline constexpr std::size_t kMostCodes = 9;
 
 constexpr std::uint32_t extra_bits(std::uint32_t symbol) {

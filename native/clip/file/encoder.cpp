@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Encodes a clip as the bytes of a .rzc file: head, blocks of frames, index.
 #include "clip/file/encoder.h"
 
 #include <cmath>

@@ -20,17 +20,20 @@ inline constexpr std::size_t kDefaultBlockFrames = 512;
 class Encoder {
  public:
   /// In: block_frames  1 to 4096: frames that are compressed and read together
-  /// Fails: kInvalidArgument with the field (a repeated name, a rate that is not above 0)
+  /// Fails: kInvalidArgument with the field (such as a repeated name or a rate that is not above 0)
   static core::Result<Encoder> create(Head head, std::size_t block_frames = kDefaultBlockFrames);
 
   /// Appends frames.
-  /// In: frames [n, controls]; times [n] if the clip has them, else empty: finite and ascending
+  /// In: frames [n, controls]; times [n] if the clip has them, else empty: seconds, finite, each
+  ///     after the one before
+  /// Fails: kInvalidArgument, and nothing is appended
   core::Status append(std::span<const float> frames, std::span<const double> times);
   void add(Event event) { pending_.push_back(std::move(event)); }
-  /// Encodes the remaining frames and the index. Afterwards no frame may be appended.
+  /// Encodes the remaining frames and events and the index. Afterwards nothing may be appended.
   void finish();
 
-  /// Returns the finished bytes, and removes them from the encoder.
+  /// Returns the bytes that were encoded since the last call of take, and removes them from the
+  /// encoder: before finish, the head and the full blocks.
   Bytes take();
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_ + filled_; }

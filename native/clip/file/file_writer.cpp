@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Writes a clip during its recording to PATH.part, which becomes PATH at the end.
 #include "clip/file/file_writer.h"
 
 #include <algorithm>

@@ -29,8 +29,8 @@ inline constexpr std::size_t kBlockStart = 28;
 inline constexpr std::size_t kEndSize = 24;
 inline constexpr std::size_t kHashSize = 8;
 
-// Maps the bits of a time, a double, to an integer so that ascending times give ascending integers.
-// The file stores second differences of these integers.
+// Maps the bits of a time, a double, to an integer so that ascending times give ascending integers
+// if these are read as int64. The file stores second differences of these integers.
 inline std::uint64_t time_in_order(std::uint64_t bits) {
   return bits ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(bits) >> 63) >> 1;
 }

@@ -18,8 +18,10 @@ class Player {
 
   /// Values of all controls [controls], in the order of the clip's names; valid until the next
   /// call.
-  /// Fails: as Reader::read. Cost: reads, decodes and allocates if the frame is in another block
-  ///        than the frame of the previous call; otherwise allocates nothing
+  /// Fails: kInvalidArgument (the clip has no such frame), kLimitExceeded, kInvalidValue,
+  ///        kInvalidLength, kTruncated
+  /// Cost:  reads, decodes and allocates if the frame is in another block than the frame of the
+  ///        previous call; otherwise allocates nothing
   core::Result<std::span<const float>> frame(std::uint64_t index);
 
   const Reader& reader() const { return reader_; }
@@ -29,9 +31,9 @@ class Player {
 
   Reader reader_;
   std::uint64_t begin_ = 0, end_ = 0;  // the decoded frames
-  std::vector<std::uint32_t> moving_;  // controls that change in these frames
+  std::vector<std::uint32_t> moving_;  // controls that the block does not describe as constant
   std::vector<float> curves_;          // [moving, frames]
-  std::vector<float> values_;          // of the last frame
+  std::vector<float> values_;          // [controls], of the frame that was requested last
 };
 
 }  // namespace risorius::clip

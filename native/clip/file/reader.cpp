@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reads .rzc files: head and index first, then single blocks of frames.
 #include "clip/file/reader.h"
 
 #include <algorithm>
@@ -174,8 +175,8 @@ core::Status Reader::read_index() {
   return read_blocks(View(*bytes).first(length), offset);
 }
 
-// Reads the table of blocks and the events. In: index  the index's bytes; offset  their place in
-// the file
+// Reads the table of blocks and the events. In: index  the index's bytes; offset  their byte offset
+// in the file
 core::Status Reader::read_blocks(View index, std::uint64_t offset) {
   Cursor in(index);
   const auto refuse = [&](ErrorCode code, std::string message) {

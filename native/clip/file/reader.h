@@ -17,9 +17,10 @@ namespace risorius::clip {
 struct Limits {
   std::uint32_t controls = 1u << 16;
   std::uint64_t frames = std::uint64_t{1} << 32;
-  std::uint64_t head_bytes = std::uint64_t{1} << 24;
-  std::uint64_t metadata = std::uint64_t{1} << 18;
-  std::uint64_t values = std::uint64_t{1} << 29;  // in one read: controls * frames
+  std::uint64_t head_bytes = std::uint64_t{1} << 24;  // also of all decoded names together
+  std::uint64_t metadata = std::uint64_t{1} << 18;    // pairs of key and value
+  // In one read: controls * frames; a frame with a time of its own counts as two more controls.
+  std::uint64_t values = std::uint64_t{1} << 29;
 };
 
 /// Whether a file without a valid end, such as an interrupted recording, is accepted.
@@ -28,34 +29,39 @@ enum class Ends { kMustBeWhole, kMayBeCut };
 /// A clip file that is read in parts. It is not thread-safe: each thread needs its own Reader.
 class Reader {
  public:
-  /// Reads the head and the index, but no curve.
-  /// Fails: kNotClip, kUnsupportedGeneration, kTruncated, kInvalidValue, kLimitExceeded.
+  /// Reads the head and the index, but no curve. With kMayBeCut and without a valid index, all
+  /// blocks are read once, and the clip ends before the first incomplete or damaged block.
+  /// Fails: kNotClip, kUnsupportedGeneration, kTruncated, kInvalidValue, kInvalidCount,
+  ///        kInvalidLength, kLimitExceeded.
   static core::Result<Reader> open(std::unique_ptr<bytes::Source> source,
                                    Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
 
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_; }
   const std::vector<Event>& events() const { return events_; }
-  /// Number of bytes of the file that belong to the clip. Only a file that was cut has more: the
-  /// bytes of an incomplete block.
+  /// Number of bytes of the file that belong to the clip. Only a file that was cut or damaged has
+  /// more: the bytes from the first incomplete or damaged block on.
   std::uint64_t byte_count() const { return end_; }
-  /// First frame of each block, followed by the number of frames.
+  /// Index of the first frame of each block; the last entry is frame_count().
   const std::vector<std::uint64_t>& block_starts() const { return starts_; }
 
-  /// Fails if read() would reject the range. Call it before allocating memory for the result.
+  /// Fails if read() would reject the range of frames, a control, or the number of values. Call it
+  /// before allocating memory for the result.
+  /// Fails: kInvalidArgument, kLimitExceeded
   core::Status may_read(std::uint64_t begin, std::uint64_t end,
                         std::span<const std::uint32_t> controls) const;
 
-  /// Writes the curves of controls to out [controls.size(), end - begin], and the times to
-  /// out_times [end - begin] unless it is null. The last block that was read stays in
-  /// memory for the next call.
+  /// Writes the curves of controls to out [controls.size(), end - begin], and the times in seconds
+  /// to out_times [end - begin], unless it is null or the clip has no times of its own. The last
+  /// block that was read stays in memory for the next call.
   /// In: begin <= end <= frame_count(), valid controls
-  /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kTruncated, kIoRead
+  /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kInvalidLength, kTruncated
   core::Status read(std::uint64_t begin, std::uint64_t end, std::span<const std::uint32_t> controls,
                     float* out, double* out_times);
 
-  /// Writes the values of the controls that are constant in a block to `values` [controls], and
-  /// appends the numbers of the other controls to `moving`. Fails: as read.
+  /// Writes the values of the controls that a block describes as constant to `values` [controls],
+  /// and appends the indices of the other controls to `moving`.
+  /// Fails: kInvalidValue, kInvalidLength, kTruncated
   core::Status resting(std::size_t block, std::span<float> values,
                        std::vector<std::uint32_t>& moving);
 
@@ -86,7 +92,7 @@ class Reader {
   std::shared_ptr<Loaded> loaded_;
 };
 
-/// Decodes a whole file. Fails: as Reader.
+/// Decodes a whole .rzc file. Fails: as Reader::open and Reader::read
 core::Result<Clip> decode(View bytes, Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
 
 }  // namespace risorius::clip

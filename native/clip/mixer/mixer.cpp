@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Evaluates a mixer at a time: layers, reactions, rules of controls that exclude each other.
 #include "clip/mixer/mixer.h"
 
 #include <algorithm>

@@ -68,7 +68,8 @@ class LayerCurves {
 
  private:
   friend class Mixer;
-  /// Controls that are consecutive both in the mixer and in the columns of this layer.
+  /// Controls that are consecutive both in the mixer and in the columns of this layer: index of the
+  /// first control in the mixer, the first column, and their number.
   struct Run {
     std::uint32_t control, column, count;
   };
@@ -78,8 +79,8 @@ class LayerCurves {
     core::AlignedVector<float> values;  // [frames, columns]; of constants [columns]
   };
   struct Place {
-    std::size_t first;
-    float part;  // share of the way to the next frame
+    std::size_t first;  // index of the frame at or before the time
+    float part;         // 0 at frame `first`, 1 at the next frame
   };
   struct Sorter;
   Place place(double time) const noexcept;
@@ -92,18 +93,19 @@ class LayerCurves {
 
 /// A layer: its curves, their timing and their weight. Times are in seconds of the scene, clip
 /// times in seconds of the clip. Without a warp the clip's part [first, last] begins at start,
-/// lasts (last - first) * scale and is played repeat times; end is derived. With a warp the layer
-/// lasts from start to end; scale, repeat and reverse are ignored, and a descending warp plays
-/// backwards. A single frame is held from start to end, which by default is at all times.
+/// lasts (last - first) * scale and is played repeat times; end is derived. With a warp, start and
+/// end become its first and last scene time; first, last, scale, repeat and reverse are ignored,
+/// and a descending warp plays backwards. A single frame is held from start to end, which by
+/// default is at all times.
 struct Layer {
   static constexpr double kAlways = std::numeric_limits<double>::infinity();
 
   std::shared_ptr<const LayerCurves> curves;
   Blend blend = Blend::kOverride;
   Extend extend = Extend::kHold;
-  Line weight{{0.0}, {1.0}};  // in [0, 1]
+  Line weight{{0.0}, {1.0}};  // scene time -> weight in [0, 1]
   double start = -kAlways, end = kAlways;
-  double first = 0.0, last = 0.0;  // clip time
+  double first = 0.0, last = 0.0;  // clip times
   double scale = 1.0, repeat = 1.0;
   bool reverse = false;
   Line warp;  // scene time -> clip time; empty: none
@@ -145,9 +147,10 @@ struct Opposites {
 ///    first + o / scale, reversed last - o / scale, where o = (t - start) mod ((last - first) *
 ///    scale); at the end of a whole number of repeats it is the end of the clip, not its start.
 ///    Between frames v = a + (b - a) * part, and m = mask * w; see Blend.
-/// 3. Each reaction in the order of set_reactions, each part with envelope e:
-///    r = strength * e * weight; out += (peak - out) * r if out < peak = min(high, 1). That is
-///    1 - (1 - out) * (1 - r), also for a control that may be driven beyond 1.
+/// 3. Each fired reaction in the order of firing, except that a reaction that replaced an ended one
+///    has the position of the ended one; each part with envelope e: r = strength * e * weight;
+///    out += (peak - out) * r if out < peak = min(high, 1).
+///    That is 1 - (1 - out) * (1 - r), also for a control that may be driven beyond 1.
 /// 4. Yields: all s are computed before any control is reduced. Then opposites:
 ///    c = min(a, b); if c > 0: a -= c, b -= c.
 /// 5. Clamped to the range; NaN becomes its lower end.
@@ -171,7 +174,8 @@ class Mixer {
   /// Replaces the reactions and stops the fired ones.
   /// Fails: kInvalidIndex, kInvalidLength, kInvalidValue.
   core::Status set_reactions(std::vector<Reaction> reactions);
-  /// Replaces the rules of controls that exclude each other. In: controls of the mixer
+  /// Replaces the rules of controls that exclude each other. In: yields, opposites  their controls
+  /// are indices below control_count()
   /// Fails: kInvalidIndex, kInvalidValue.
   core::Status set_rules(std::vector<Yield> yields, std::vector<Opposites> opposites);
 
@@ -184,8 +188,8 @@ class Mixer {
   bool fire(std::size_t reaction, double time, float strength) noexcept;
   void clear_fired() noexcept { voice_count_ = 0; }
 
-  /// Computes the controls at a time. The result depends only on the time, the base and the fired
-  /// reactions.
+  /// Computes the controls at a time. Apart from the layers, reactions and rules that are set, the
+  /// result depends only on the time, the base and the fired reactions.
   /// In:    base  float[controls], or null for 0
   /// Out:   out   float[controls], may be base
   /// Cost:  allocates nothing. Not thread-safe, because it has a workspace

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Converts vectors and Euler angles between coordinate systems, in double, for row vectors.
 #include "dna/convert/change_of_basis.h"
 
 #include <algorithm>

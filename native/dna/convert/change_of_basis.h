@@ -50,10 +50,12 @@ class Rotation {
   /// The factor of an angle about a source axis. It holds for any rotation with same_order,
   /// otherwise only for rotations about a single axis.
   double factor(std::size_t source_axis) const { return factor_[source_axis]; }
+  /// The factor from the source's unit of angles to the target's.
   double unit() const { return unit_; }
 
-  /// The converted angles. Without same_order, a rotation about several axes gets a middle angle
-  /// within 90 degrees; in gimbal lock the last angle is 0.
+  /// The converted angles. In: stored  by source axis. Out: by target axis. Without same_order, a
+  /// rotation about several axes gets a middle angle from -90 to 90 degrees; in gimbal lock the
+  /// last angle is 0.
   Vec3 operator()(const Vec3& stored) const;
 
  private:

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Converts a Dna to other axes, rotation order, signs, winding and units, layer by layer. A joint
+// group's rows are joint attributes, its columns controls.
 #include "dna/convert/coordinates.h"
 
 #include <algorithm>
@@ -173,8 +175,9 @@ std::map<std::size_t, RotationRows> rotation_rows(const JointGroup& g, std::size
   return out;
 }
 
-// The number of leading rows that any LOD uses. Further rows are dropped: if they were converted
-// together with used rows of the same joint, they would change the pose.
+// The number of leading rows that any LOD uses, or all rows if the group lists no LODs. Further
+// rows are dropped: if they were converted together with used rows of the same joint, they would
+// change the pose.
 std::size_t used_rows(const JointGroup& g) {
   return g.lods.empty() ? g.output_indices.size() : *std::ranges::max_element(g.lods);
 }
@@ -185,8 +188,8 @@ struct Rows {
   std::vector<float> values;
 };
 
-// Converts a row to one row. This is possible for translations, for scales, and for angles if the
-// order of rotation stays.
+// Converts a row to one row, which is added to `out`. This is possible for translations, for
+// scales, and for angles if the order of rotation stays.
 void move_row(const Conversion& c, const JointGroup& g, std::size_t row, Rows& out) {
   const std::size_t columns = g.input_indices.size(), output = g.output_indices[row];
   const std::size_t kind = output % kAttributes / 3, axis = output % 3;
@@ -199,7 +202,8 @@ void move_row(const Conversion& c, const JointGroup& g, std::size_t row, Rows& o
   }
 }
 
-// Converts the rotation rows of a joint, at most three, to three rows. Rows of zeros are dropped.
+// Converts the rotation rows of a joint, one to three, to at most three rows: rows of zeros are
+// left out.
 void mix_rows(const Conversion& c, const JointGroup& g, const RotationRows& joint, Rows& out) {
   const std::size_t columns = g.input_indices.size();
   const std::size_t output = g.output_indices[joint.first], rx = output - output % 3;
@@ -272,7 +276,8 @@ bool cuts_rotation(const JointGroup& g) {
   return false;
 }
 
-// The axes about which a joint rotates, and the groups that rotate it.
+// The axes about which a joint rotates, and its joint groups: whether any group rotates the joint
+// (driven), whether several do (split), and the last that does (group).
 struct Turns {
   bool driven = false, split = false;
   std::size_t group = 0;
@@ -348,8 +353,8 @@ bool is_w(const std::vector<std::string>& raw_control_names, std::size_t control
   return name.ends_with(".w") || name.ends_with(".qw");
 }
 
-// Whether a solver's inputs are quaternions. They are for all distance methods except the Euclidean
-// one, for which the names of the controls decide, as everywhere in the format.
+// Whether a solver's inputs are quaternions: their number is a multiple of 4, and the distance
+// method is not the Euclidean one, or each fourth control has a name of a w (*.w or *.qw).
 bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_control_names) {
   if (s.raw_control_indices.size() % 4 != 0) return false;
   if (s.distance_method != 0) return true;
@@ -370,7 +375,8 @@ Array<float> converted_quaternions(const Basis& basis, const Array<float>& value
   return out;
 }
 
-// The sign of the axis is ignored, because a twist about the opposite axis is treated alike.
+// Converts the number of a twist axis (0 x 1 y 2 z). The sign of the axis is ignored, because a
+// twist about the opposite axis is treated alike.
 void convert_axis(const Basis& basis, std::uint16_t& axis) {
   if (axis < 3) axis = static_cast<std::uint16_t>(basis.to[axis]);
 }
@@ -388,7 +394,8 @@ void convert_control_rotations(const Conversion& c, Dna& dna) {
 }
 
 // Warns if correctives, joint groups, channels, maps or networks read single components of a
-// quaternion, because no change of basis preserves them.
+// quaternion, because no change of basis preserves them. Only the w is recognised, by its name (*.w
+// or *.qw).
 void warn_of_components(const Dna& dna, Warnings& warnings) {
   const auto check = [&](const char* where, const auto& controls) {
     for (const auto control : controls) {
@@ -413,7 +420,7 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 // ---- networks that move joints
 
 // The numbers of the networks are not converted. Instead, parameters 3 to 9 of MlJoints name the
-// coordinate system to which the numbers refer.
+// coordinate system to which the numbers refer. They stay as they are if all of them are present.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;
   const auto& keys = joints.parameter_keys;
@@ -469,7 +476,7 @@ void warn_of_unknown_layers(const Dna& dna, Warnings& warnings) {
 }
 
 void set_system(const System& target, Dna& dna) {
-  // The layer dsce stores all of these fields only in version 2.8.
+  // The layer dsce exists from 2.7 on, and only from 2.8 on stores all fields of descriptor_ext.
   if (dna.descriptor_ext != target.ext && dna.version < 8) dna.version = 8;
   dna.descriptor.coordinate_system = target.axes;
   dna.descriptor.translation_unit = target.translation_unit;

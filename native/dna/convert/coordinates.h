@@ -35,7 +35,8 @@ struct CoordinateTarget {
 /// Raw controls that carry a rotation (inputs of RBF solvers, twists and swings) refer to the new
 /// axes afterwards. The numbers of networks that move joints are not converted; their layer names
 /// the old axes.
-/// In/out: warnings  gets an entry for each field that the format cannot express in the new system
+/// In/out: warnings  gets entries for content that was not or only approximately converted, most
+///                   with the number of joints or the first control concerned
 /// Fails: kInvalidArgument (an invalid target), kInvalidValue (the file's own system is invalid, or
 ///        a joint group would not fit the format), and as validate
 core::Result<Dna> convert_coordinates(const Dna& dna, const CoordinateTarget& target,

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Removes the LODs, joints, channels, maps, meshes and networks that a plan drops from a Dna, and
+// renumbers the indices of the others.
 #include "dna/convert/lods.h"
 
 #include <algorithm>
@@ -287,8 +289,8 @@ void apply_to_targets(const LodPlan& plan, const Where& where, Lookup& lookup, M
   if (std::ranges::find(keep, false) != keep.end()) select(m.blend_shape_targets, keep);
 }
 
-// Renumbers the networks. A network is kept if a kept LOD lists it or if an operation of layer mlbe
-// runs it at a kept LOD.
+// Removes networks and renumbers the others. A network is kept if a kept LOD lists it or if an
+// operation of layer mlbe runs it at a kept LOD.
 void apply_to_networks(const LodPlan& plan, Lookup& lookup, Dna& dna) {
   MachineLearnedBehavior& ml = dna.machine_learned_behavior;
   std::vector<bool> keep = needed(plan, ml.lod_neural_network_mapping, ml.neural_networks.size());
@@ -428,7 +430,6 @@ void apply_to_extensions(const LodPlan& plan, std::size_t lod_count, Lookup& loo
 
 }  // namespace
 
-// Drops channels together with the entries that drive them.
 Status drop_channels(const LodPlan& plan, std::vector<bool> entries, Dna& dna) {
   Lookup lookup;
   BlendShapeChannels& s = dna.behavior.blend_shape_channels;

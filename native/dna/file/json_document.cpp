@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Parses JSON text to a tree of values, with limits and positions of errors.
 #include "dna/file/json_document.h"
 
 #include <optional>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reads a Dna from the JSON text that to_json writes.
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -43,7 +44,7 @@ class Reader {
 
   void error(const std::string& message, ErrorCode code = ErrorCode::kInvalidValue);
   // Runs `body`, which reads the members of object `json`. A member that body does not read is an
-  // error.
+  // error, except "signature", "size" and "offset".
   void object(const Json& json, FunctionRef<void()> body);
   void member(const std::string& name, FunctionRef<void(const Json&)> body);
   bool has(const std::string& name) const { return object_->contains(name); }
@@ -366,7 +367,7 @@ Result<Dna> from_json(std::string_view text, const Limits& limits) {
   Result<Json> json = detail::parse_document(text, limits);
   if (!json) return std::move(json).propagate();
   Dna dna;
-  dna.descriptor.coordinate_system = {0, 0, 0};  // a file without this layer has these values
+  dna.descriptor.coordinate_system = {0, 0, 0};  // the values of a text without the layer desc
   Reader r(limits);
   r.object(*json, [&] { read_layers(r, dna); });
   if (r.failed()) return r.take_error();

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Writes a Dna as JSON text.
 #include <bit>
 #include <charconv>
 #include <cmath>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Reads the fields of DNA layers from bytes. With a plan of the LODs to keep, it skips elements
+// that no kept LOD uses.
 #include "dna/file/layer_reader.h"
 
 #include <algorithm>
@@ -207,8 +209,8 @@ void LayerReader::skin(Mesh& m) {
   m.skin_joint_indices = std::move(joints);
 }
 
-// Removes the influences of dropped joints from the vertex that was just read. Out: number of
-// influences left
+// Removes the influences of dropped joints from the vertex that was just read. A joint index that
+// is out of range makes the byte reader fail. Out: number of influences left, 0 after a failure
 std::size_t LayerReader::cut_vertex(float* weights, std::uint16_t* joints, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
     if (joints[i] < plan->joints.size() || r_.failed()) continue;
@@ -227,7 +229,8 @@ bool LayerReader::channel_is_wanted(std::uint16_t channel) const {
 
 // Reads ahead the channel index at the end of a blend shape target. It assumes first that all lists
 // are as long as the first one. If the channel found there is not wanted, the lists are skipped one
-// by one to the true end.
+// by one to the true end. Out: true: the reader is at the begin of the target again; false: it is
+// behind the target, or has failed
 bool LayerReader::target_is_wanted() {
   const std::uint64_t begin = r_.position();
   const auto go_back = [&] { return r_.enter(begin, r_.end() - begin); };

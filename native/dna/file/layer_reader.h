@@ -33,7 +33,9 @@ class Places {
     const auto at = fields_.lower_bound(where);
     if (at != fields_.end() && at->starts_with(where)) places_.insert({where, place});
   }
-  /// The byte offset in the file of the value that `where` names, in the form of validate's errors.
+  /// The byte offset in the file of the value that `where` names, such as
+  /// "geometry.meshes[3].positions[7]"; if the value has no recorded place, the offset of the
+  /// smallest recorded struct or list around it; nullopt if there is none.
   std::optional<std::uint64_t> find(std::string where) const;
 
  private:
@@ -121,7 +123,8 @@ class LayerReader {
   void faces(Mesh& m);
   void skin(Mesh& m);
   void targets(Mesh& m);
-  /// Records the position of the field that is being read.
+  /// Records the position of the field that is being read. In: at  its byte offset in the file;
+  /// element_size, plane  as in Place
   void note(std::uint64_t at, std::uint32_t element_size = 0, std::uint32_t plane = 0) {
     if (places != nullptr) add_place({at, element_size, plane});
   }

@@ -14,7 +14,7 @@ namespace risorius::dna::detail {
 
 class LayerWriter {
  public:
-  bool mesh_sizes = true;  // as in LayerReader
+  bool mesh_sizes = true;  // 2.2+: a mesh is preceded by its size; 2.1: by the offset of its end
 
   explicit LayerWriter(bytes::ByteWriter& writer) : w_(writer) {}
 
@@ -90,7 +90,8 @@ class LayerWriter {
   void element(const T& v) {
     describe(*this, v);
   }
-  // Writes a list of lists that is stored as one flat list and offsets.
+  // Writes a list of lists that Dna stores as one flat list and offsets. In: item(begin, n)  writes
+  // the inner list of n elements that begin at index `begin` of the flat list
   template <class Item>
   void rows(const core::Array<std::uint32_t>& offsets, Item item) {
     const std::size_t n = offsets.empty() ? 0 : offsets.size() - 1;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Parses a DNA file: its header, then the layers of the index (2.2 and later) or the sections whose
+// offsets follow the header (2.1).
 #include "dna/file/parse.h"
 
 #include <algorithm>
@@ -98,7 +100,9 @@ class Parser {
  private:
   using Body = void (Parser::*)();
 
-  // Reads one layer. Out: false if parsing must stop
+  // Reads one layer, or one section of a 2.1 file, by calling `body`.
+  // In:  offset, size  place of the layer's bytes in the file
+  // Out: false if parsing must stop
   template <class Read>
   bool read(const char* name, std::uint64_t offset, std::uint64_t size, Read body) {
     if (r_.failed() || error_) return false;
@@ -456,8 +460,8 @@ std::vector<Finding> check(bytes::Source& source, const Limits& limits) {
   for (const Warning& w : dna->warnings) {
     findings.push_back({false, {ErrorCode::kInvalidValue, w.offset, w.where, w.message}});
   }
-  // If a layer could not be read it is empty, and errors about indices into it would only repeat
-  // that error.
+  // If a layer could not be read it is empty or incomplete, and errors about indices into it would
+  // only repeat that error.
   const bool whole = std::ranges::none_of(findings, &Finding::is_error);
   for (Finding& f : detail::find_all(*dna)) {
     if (!whole && f.error.code != ErrorCode::kInvalidValue) continue;

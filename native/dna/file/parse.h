@@ -21,8 +21,9 @@ struct Limits {
   std::uint32_t max_nesting = 32;                    // levels of JSON
 };
 
-/// The parts of the file to read; other parts are skipped. The descriptor is always read. The other
-/// layers need the definition, and rbf_behavior also needs the behavior.
+/// The parts of the file to read; other parts are skipped. The layers desc and dsce are always
+/// read. Without the definition, parse fails if a layer that is read has indices of joints,
+/// controls, channels or LOD lists, because there is nothing to check them against.
 struct ParseOptions {
   bool definition = true;
   bool behavior = true;
@@ -33,21 +34,23 @@ struct ParseOptions {
   bool joint_behavior_metadata = true;
   bool twist_swing_behavior = true;
   bool unknown_layers = true;             // layers with unknown ids or versions
-  bool unreferenced_blend_shapes = true;  // false: see remove_unreferenced_blend_shapes
+  bool unreferenced_blend_shapes = true;  // false: drop channels that no LOD lists
   LodSelection lods;
   Limits limits;
 };
 
-/// Reads a DNA file of generation 2, any minor version (dna-format: container and layers 2.1 to
-/// 2.8; newer minors by the rules of 2.8).
+/// Reads a DNA file of generation 2, any minor version (2.9 and later by the rules of 2.8).
 /// Fails: kNotDna, kUnsupportedGeneration, kTruncated, kInvalidCount, kInvalidLength,
 ///        kInvalidIndex, kInvalidValue, kLimitExceeded, kIoRead, kInvalidArgument (LODs that do not
-///        exist), each with the field and, except for the last, the byte offset
+///        exist), each with the field. The byte offset is missing in kInvalidArgument, and in
+///        errors of validate if LODs were selected, because indices then count only kept elements
 /// Cost: allocates at most a small constant times the file's size
 core::Result<Dna> parse(bytes::Source& source, const ParseOptions& options = {});
 
-/// All errors and oddities of a file, in the order of the file, each with field and byte offset. A
-/// layer that cannot be read does not hide errors of the others.
+/// Errors and oddities of a file, in the order of the file, each with the field and, if known, the
+/// byte offset (unknown ones are last). After a layer that cannot be read the other layers are read
+/// nevertheless; but then errors of indices and of lengths of lists are left out, because they
+/// might only follow from the missing layer.
 std::vector<Finding> check(bytes::Source& source, const Limits& limits = {});
 
 }  // namespace risorius::dna

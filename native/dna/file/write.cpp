@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Writes a Dna as the bytes of a DNA file of version 2.1 to 2.8.
 #include "dna/file/write.h"
 
 #include <algorithm>
@@ -149,8 +150,9 @@ std::vector<std::string> newer_layers(const Dna& dna, std::uint16_t minor) {
   return ids;
 }
 
-// Warns of each layer that the version does not know. In: kept  true: such layers are written
-// nevertheless; false: they are left out
+// Warns of each layer with content that the version does not know, of unknown layers if they are
+// left out, and of a face winding order that the version cannot store. In: kept  true: layers that
+// the version does not know are written nevertheless; false: they are left out
 void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
                     std::vector<Warning>& warnings) {
   const std::string version = "version 2." + std::to_string(options.minor);
@@ -170,8 +172,8 @@ void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
   }
 }
 
-// The face without the layers and controls that this version cannot store, or nullopt if the whole
-// face can be stored.
+// The face without the layers that this version cannot store, without their controls and without
+// unread controls, or nullopt if nothing has to be left out.
 // In: kept  true: layers that the version does not know are written nevertheless
 Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
                                    std::vector<Warning>& warnings) {

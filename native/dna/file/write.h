@@ -17,11 +17,13 @@ struct WriteOptions {
   bool newer_layers = true;
 };
 
-/// Writes the bytes of a file. Versions after 2.1 get an empty layer for each known layer that is
-/// missing, in the order of the source's index. If a layer that provides controls was not loaded or
-/// cannot be written, everything that its controls drive is left out too, with a warning, so that
-/// the file is consistent. Rewriting a file in its own version gives the same bytes.
-/// In/out: warnings  gets an entry for each layer that the version cannot hold
+/// Writes the bytes of a file. Versions after 2.1 have the layers in the order of the source's
+/// index, then the other layers of the version, which are empty if `dna` lacks them. If a layer
+/// that provides controls was not loaded or cannot be written, everything that its controls drive
+/// is left out too, with a warning, so that the file is consistent. A file with all layers of its
+/// version, loaded whole and without warnings, gets the same bytes in this version.
+/// In/out: warnings  gets an entry for each layer and field that the version cannot hold, and one
+///                   entry if other content is left out with the controls that drive it
 /// Fails: kInvalidArgument (an unknown version; a network, pose or setup that needs a dropped
 ///        control), kLimitExceeded (more than the format's 4 GiB), and as validate
 core::Result<std::vector<std::uint8_t>> write(const Dna& dna, const WriteOptions& options,

@@ -21,10 +21,10 @@ _U32: TypeAlias = npt.NDArray[np.uint32]
 _Int: TypeAlias = SupportsInt | SupportsIndex
 _Float: TypeAlias = SupportsFloat | SupportsIndex
 _Path: TypeAlias = PathLike[str] | str | bytes
-# is_error, code, where, offset, message
+# (is_error, code, where, byte offset in the file or None, message)
 _Finding: TypeAlias = tuple[bool, str, str, int | None, str]
 
-# time, name, duration, value
+# (time in seconds, name, duration in seconds, value)
 _Event: TypeAlias = tuple[float, str, float, str]
 
 class ClipError(RisoriusError):
@@ -62,7 +62,8 @@ class ClipFile:
     def read(
         self, begin: _Int, end: _Int, controls: Sequence[_Int] | None = None
     ) -> tuple[_F32, _F64 | None]:
-        """float32[controls, frames], and the times of the frames, or None."""
+        """float32[controls, frames] of frames begin to end - 1, and the times of these frames in
+        seconds; None instead of the times if the clip stores no times."""
 
 class ClipFileWriter:
     """A .rzc file during recording."""
@@ -217,7 +218,7 @@ class BlendShapeChannels:
     def output_indices(self, value: npt.ArrayLike) -> None: ...
 
 class AnimatedMaps:
-    """Controls to animated maps, by conditionals."""
+    """Conditionals that turn control values into values of animated maps."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> AnimatedMaps: ...
@@ -330,7 +331,7 @@ class NeuralNetworkLayer:
     def activation_parameters(self, value: npt.ArrayLike) -> None: ...
 
 class NeuralNetwork:
-    """Control indices mapped to control indices."""
+    """A network that reads the controls input_indices and writes the controls output_indices."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> NeuralNetwork: ...
@@ -349,7 +350,7 @@ class NeuralNetwork:
     def layers(self, value: Iterable[NeuralNetworkLayer]) -> None: ...
 
 class MachineLearnedBehavior:
-    """Layer mlbh."""
+    """Layer mlbh: neural networks and the controls that they write."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> MachineLearnedBehavior: ...
@@ -441,7 +442,7 @@ class MlJoints:
     def output_indices(self, value: npt.ArrayLike) -> None: ...
 
 class MachineLearnedBehaviorExt:
-    """Layer mlbe."""
+    """Layer mlbe: operations that run the networks of layer mlbh, and joints that networks move."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> MachineLearnedBehaviorExt: ...
@@ -520,7 +521,7 @@ class RbfPose:
     def scale(self, value: _Float) -> None: ...
 
 class RbfBehavior:
-    """Layer rbfb."""
+    """Layer rbfb: radial basis function solvers and their poses."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> RbfBehavior: ...
@@ -539,7 +540,9 @@ class RbfBehavior:
     def poses(self, value: Iterable[RbfPose]) -> None: ...
 
 class RbfPoseControls:
-    """Inputs and outputs of a pose."""
+    """The output controls of a pose of layer rbfb. Each output control gets its weight times the
+    value of the pose times the product of the input controls.
+    """
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> RbfPoseControls: ...
@@ -558,7 +561,7 @@ class RbfPoseControls:
     def output_control_weights(self, value: npt.ArrayLike) -> None: ...
 
 class RbfBehaviorExt:
-    """Layer rbfe."""
+    """Layer rbfe: the output controls of each pose of layer rbfb."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> RbfBehaviorExt: ...
@@ -573,7 +576,7 @@ class RbfBehaviorExt:
     def poses(self, value: Iterable[RbfPoseControls]) -> None: ...
 
 class JointBehaviorMetadata:
-    """Layer jbmd."""
+    """Layer jbmd: the representation of the attributes of each joint."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> JointBehaviorMetadata: ...
@@ -608,7 +611,7 @@ class TwistSwingSetup:
     def twist_axis(self, value: _Int) -> None: ...
 
 class TwistSwingBehavior:
-    """Layer twsw."""
+    """Layer twsw: setups that distribute the twist or the swing of a rotation over joints."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> TwistSwingBehavior: ...
@@ -752,9 +755,9 @@ class Dna:
     joint_behavior_metadata: JointBehaviorMetadata
     twist_swing_behavior: TwistSwingBehavior
     def to_bytes(self, version: str = "2.8", unknown_layers: str = "preserve") -> bytes:
-        """The bytes of a file of this version. The version may not hold newer or unknown layers:
-        they are written with a UserWarning by layer (2.1 has no place for them), or left out with
-        unknown_layers='ignore'.
+        """The bytes of a file of this version. A UserWarning names each layer that the version does
+        not know. Newer and unknown layers are written anyway (2.1 has no place for them), or left
+        out with unknown_layers='ignore'.
         """
     def save(self, path: _Path, version: str = "2.8", unknown_layers: str = "preserve") -> None:
         """Writes the file atomically: the old file stays until the new one is complete."""
@@ -874,7 +877,8 @@ def check_file(path: _Path, limits: Limits, /) -> list[_Finding]: ...
 
 class Pose:
     """joints float32[J, 9]: tx ty tz rx ry rz sx sy sz deltas from neutral in the file's units and
-    axes; blend_shapes[B]; animated_maps[A] in [0, 1]; controls[raw + corrective + ...]
+    axes, or with rotation='quaternion' [J, 10]: tx ty tz qx qy qz qw sx sy sz; blend_shapes[B];
+    animated_maps[A] in [0, 1]; controls[raw + corrective + ...]
     """
 
     @property
@@ -895,7 +899,8 @@ class Instance:
     def lod(self, value: _Int) -> None: ...
     @property
     def masks(self) -> _F32:
-        """float32, one per region of each mesh; 0 disables the region's networks. A copy."""
+        """float32, one per region of each mesh; 0 disables the region's networks. The property
+        gives a copy: assign the whole array to change a mask."""
     @masks.setter
     def masks(self, value: npt.ArrayLike) -> None: ...
     def evaluate(self, raw: npt.ArrayLike, check: bool = False) -> Pose:
@@ -1133,7 +1138,10 @@ def deform_faces(
     anew: bool = False,
     threads: _Int = 0,
 ) -> list[tuple[int, ...]]:
-    """The same from poses: joints float32[J, 9] and blend_shapes float32[C] per face."""
+    """Deforms several faces by given poses -> per face the meshes that were written.
+
+    joints float32[J, 9] and blend_shapes float32[C] per face; targets as in evaluate_faces.
+    """
 
 class Skins:
     """See risorius.Surface."""
@@ -1147,7 +1155,7 @@ class Probe:
     def positions(self, raw: npt.ArrayLike) -> _F64:
         """float32[R] -> float64[P, 3]."""
     def linearise(self, raw: npt.ArrayLike, highest: npt.ArrayLike, free: npt.ArrayLike) -> None:
-        """Keeps the derivative of the points by each control at a pose."""
+        """Computes and keeps the derivative of the points by each control at the pose `raw`."""
     def jacobian(self) -> _F32:
         """float32[P, 3, R], from the last linearise."""
     def normal_matrix(self) -> _F64:
@@ -1188,7 +1196,7 @@ def quaternion_column_orders(dna: Dna) -> list[npt.NDArray[np.uint32]]:
     """
 
 def available_simd() -> str:
-    """The instruction sets of this processor, in the words of `simd=`, separated by blanks."""
+    """The instruction sets of this processor, in the words of `simd=`, separated by ", "."""
 
 class GroupSizes:
     """Number of joint groups, rows, stored coefficients (with zeros), and nonzero coefficients."""
@@ -1203,7 +1211,7 @@ class GroupSizes:
     def nonzero(self) -> int: ...
 
 class LargestChange:
-    """The largest difference of one kind; joint is "" if there is none."""
+    """The largest difference of one kind between two rigs; joint is "" if nothing differs."""
 
     @property
     def value(self) -> float: ...
@@ -1356,7 +1364,7 @@ class FaultSums:
         """Area of the most stretched face, relative to its neutral area."""
     @property
     def folded(self) -> int:
-        """Number of edges whose faces lie on one another."""
+        """Number of edges whose two faces lie on each other."""
 
 class SkinFaults:
     """The faults of a posed skin."""
@@ -1389,8 +1397,8 @@ class SkinChecker:
     def shown(self) -> npt.NDArray[np.bool_]:
         """bool[V]: visible vertices; only these must stay outside."""
     def nearest(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> tuple[_U32, _F64, _F64]:
-        """uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3] shares of
-        them, float64[n] mm."""
+        """uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3]
+        barycentric coordinates in these corners, float64[n] distance in mm."""
     def look(self, skin: npt.ArrayLike, solids: Sequence[npt.ArrayLike]) -> SkinFaults:
         """SkinFaults of a pose."""
     def sum(self, faults: SkinFaults, allowed: SkinFaults) -> FaultSums:

@@ -10,7 +10,10 @@ from .polygons import Floats, Operator, Polygons
 
 @dataclass
 class Part:
-    """A mesh at one LOD; `carry` converts values of base mesh vertices to vertices of this mesh."""
+    """A mesh at one LOD.
+
+    `carry` converts values [V, ...] of the base mesh's vertices to values of this mesh's vertices.
+    """
 
     name: str
     polygons: Polygons

@@ -69,7 +69,7 @@ class Person:
     beard_style: str = "none"
 
     def shape(self) -> dict[str, float]:
-        """Name of a body shape of the data -> weight; features are separate, see Source.feature."""
+        """Name of a body shape of the data -> weight, without the shapes in `features`."""
         ages: dict[str, float] = {}
         for (low, young), (high, old) in itertools.pairwise(_AGES):
             if low <= self.age <= high:
@@ -168,7 +168,16 @@ class _Reader:
 
 
 def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
-    """Reads a person from a TOML table. Raises: ValueError: an invalid key, which it names."""
+    """Reads a person from a TOML table.
+
+    Args:
+        where: name of the table in errors.
+        table: the person's table.
+        like: a person whose values are used for missing keys, or None.
+
+    Raises:
+        ValueError: an unknown key, an invalid value, or a missing key; the text names the key.
+    """
     read = _Reader(where, table)
     values: dict[str, Any] = dict(vars(like)) if like else {}
     values |= read.take("name", read.text) | read.take("gender", read.gender)
@@ -210,7 +219,7 @@ def read_person(path: Path) -> Person:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: not TOML, or an invalid TOML key or value.
+        ValueError: not TOML, an unknown or missing TOML key, or an invalid value.
     """
     table = toml.read(path)
     like = table.pop("like", None)

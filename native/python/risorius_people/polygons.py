@@ -55,11 +55,11 @@ def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
 
 
 def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons, Operator]:
-    """Cuts a mesh by a plane and removes the part below; cut edges get a new vertex.
+    """Removes the part of a mesh below a height; edges that cross this height get a new vertex.
 
     Args:
         mesh: the mesh; not changed.
-        heights: float64[V], height of each vertex above the plane.
+        heights: float64[V], height of each vertex, by any measure.
         level: height at which the mesh is cut.
 
     Returns:
@@ -124,7 +124,8 @@ def compact_uvs(mesh: Polygons) -> Polygons:
 
 
 def subdivide(mesh: Polygons) -> tuple[Polygons, Operator]:
-    """Subdivides once by Catmull-Clark; texture coordinates are subdivided linearly.
+    """Subdivides once by Catmull-Clark; texture coordinates are subdivided linearly. Returns the
+    new mesh, and the operator that converts values of the old vertices to the new ones.
 
     E. Catmull and J. Clark, "Recursively generated B-spline surfaces on arbitrary topological
     meshes", 1978; borders become cubic B-spline curves.

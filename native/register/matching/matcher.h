@@ -21,9 +21,10 @@ struct Target {
 /// Properties of the template's vertices at the start of the registration. They stay constant while
 /// the vertices move.
 struct Looks {
-  std::vector<Bend> bends;           // [V]
-  std::vector<double> belief;        // [V] 0: has no counterpart, 1: has one
-  std::vector<double> inside;        // [V] 1: hidden in a cavity, which the target may also have
+  std::vector<Bend> bends;     // [V]
+  std::vector<double> belief;  // [V] 0: has no counterpart, 1: has one; between: uncertain
+  // [V] 1: hidden in a cavity, which the target may also have; all 0 if the caller gave `trusted`
+  std::vector<double> inside;
   std::vector<std::uint8_t> border;  // [V] not 0: on the border of the template
   std::vector<RimEdge> rim;          // the edges of that border
 };
@@ -43,10 +44,12 @@ class Matcher {
   Matcher(const Target& target, const Looks& looks, std::size_t threads);
 
   /// [V] matches with the target's samples that are nearest by position, normal and bending.
+  /// Vertices at the template's border are matched with the target's borders.
+  /// In: points, normals  [V] current vertices of the template, in millimetres
   std::vector<Match> by_features(const Points& points, const Points& normals,
                                  const Counting& counting) const;
-  /// The point of the target that is closest to a vertex, among triangles with a similar normal;
-  /// triangle -1: there is none.
+  /// The point of the target that is closest to a vertex, among triangles whose normal has at least
+  /// a given cosine with the vertex's normal; triangle -1: there is none.
   struct Closest {
     std::int32_t triangle = -1;
     Vec3 shares = Vec3::Zero();
@@ -61,8 +64,10 @@ class Matcher {
   /// within 2 mm, and the cosine between its normal and the vertex's normal is above 0.8.
   static bool is_inside(const Closest& found, const Vec3& normal);
   /// [V] matches with the closest points of the target.
-  /// In: farthest  mm, largest distance of a match
-  ///     robust    mm, distance at which the weight of a match is a quarter
+  /// In: farthest      mm, largest distance of a match
+  ///     least_cosine  between the normals of a vertex and of its triangle
+  ///     robust        mm, distance at which the weight of a match is a quarter
+  ///     along         weight of a match along the surface, against 1 across it
   std::vector<Match> by_distance(const Points& points, const Points& normals, double farthest,
                                  double least_cosine, double robust, double along) const;
 

@@ -15,7 +15,7 @@ constexpr double kTurn = 15.0;       // mm that a difference of 1 of outward dir
 constexpr double kSameWay = 0.6;     // least cosine between the outward directions
 constexpr double kAlike = 1.6;       // largest ratio of the lengths of both borders
 constexpr double kLeastLoop = 25.0;  // mm: shorter borders are faults of a mesh
-constexpr double kAlong = 0.1;       // weight along the border
+constexpr double kAlong = 0.1;       // weight across the outward direction
 
 Vec3 way_out(const Vec3& a, const Vec3& b, const Vec3& normal) {
   return (b - a).cross(normal).stableNormalized();

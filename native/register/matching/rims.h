@@ -7,7 +7,8 @@
 
 namespace risorius::registering::steps {
 
-/// An edge at the border of a surface. Its triangle is to the left of the direction from a to b.
+/// An edge at the border of a surface. Seen from outside, its triangle is to the left of the
+/// direction from a to b.
 struct RimEdge {
   std::uint32_t a = 0, b = 0;
   double loop = 0.0;  // mm, total length of the edges that are connected with it
@@ -22,7 +23,8 @@ class Rims {
   explicit Rims(const Form& target, const std::vector<std::uint8_t>& borders);
 
   /// Matches border vertices of the template with borders of the target that have a similar length
-  /// and outward direction. Such a match has little weight along the border.
+  /// and outward direction. Such a match has little weight along the border and along the normal of
+  /// the surface.
   /// In: points, normals  [V] current vertices of the template
   ///     farthest         mm, largest distance of a match; a different outward direction adds to
   ///                      the distance

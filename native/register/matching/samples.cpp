@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Samples points evenly over a surface, and measures its bending around points.
 #include "register/matching/samples.h"
 
 #include <Eigen/Geometry>

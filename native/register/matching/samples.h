@@ -17,7 +17,7 @@ struct Samples {
   Points points, normals;
   std::vector<Bend> bends;
   std::vector<std::uint8_t> border;  // not 0: on a triangle at the border of the surface
-  double spacing = 1.0;
+  double spacing = 1.0;              // mm between neighbouring samples
 };
 
 /// Unit normals of vertices, weighted by the angles of their triangles; 0 without triangles.

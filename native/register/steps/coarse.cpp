@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Solves a coarse step: affine motions of nodes, which carry the vertices around them, that bring
+// vertices near their matches on the target.
 #include "register/steps/coarse.h"
 
 #include <Eigen/Dense>

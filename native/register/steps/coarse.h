@@ -16,8 +16,8 @@ class Coarse {
   ~Coarse();
 
   struct Pull {
-    double stiffness = 1.0;  // of the nodes, against the sum of the matches of a cell
-    double landmarks = 1.0;  // weight of a pair, against the same sum
+    double stiffness = 1.0;  // of the nodes, against the mean weight of a cell's matches
+    double landmarks = 1.0;  // weight of a pair, against the same mean
   };
   /// Solves for motions of the nodes that bring vertices near their matches. False: the system has
   /// no solution.

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Solves a fine step: a motion of each vertex that brings it near its match on the target and is
+// similar to its neighbours' motions.
 #include "register/steps/fine.h"
 
 #include <Eigen/SparseCholesky>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Builds the graph of a template's vertices, and spreads nodes over it that carry the vertices.
 #include "register/steps/graph.h"
 
 #include <algorithm>

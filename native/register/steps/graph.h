@@ -10,7 +10,7 @@
 namespace risorius::registering::steps {
 
 /// The neighbours of each vertex along the edges of triangles. A vertex without triangles has none,
-/// such as the second of two coinciding vertices.
+/// such as the second of two coinciding vertices if the triangles use only the first.
 class Graph {
  public:
   Graph(std::size_t vertices, const std::vector<Triangle>& triangles);

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Checks the surfaces of a registration, scales them to millimetres, and prepares the search for
+// matches.
 #include "register/steps/prepare.h"
 
 #include <Eigen/Dense>
@@ -155,8 +157,8 @@ std::vector<Triangle> welded(const Mesh& mesh) {
   return out;
 }
 
-/// The share of rays into the half space above a vertex that the surface itself does not block.
-/// In: own  the surface
+/// The share, 0 to 1, of rays into the half space above a vertex that the surface itself does not
+/// block; 1 for a vertex without a normal. In: own  search tree of the surface
 double openness(const author::detail::Nearest& own, const Vec3& point, const Vec3& normal) {
   if (normal.squaredNorm() < 0.5) return 1.0;
   const Vec3 side = normal.unitOrthogonal(), other = normal.cross(side);

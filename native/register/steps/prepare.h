@@ -27,11 +27,14 @@ core::Status check(const Mesh& templ, const Mesh& target, const std::vector<Pair
 core::Result<std::vector<Vector3>> aligned(const Mesh& templ, const std::vector<Pair>& pairs);
 /// The scale of the target: the template's size in mm, divided by the size of the start positions
 /// in the target's unit.
-/// Fails: kInvalidArgument (a template outside 10 mm to 100 m, or a start of size 0)
+/// Fails: kInvalidArgument (a template whose vertices' root mean square distance from their middle
+///        is outside 10 mm to 100 m, or a start of size 0)
 core::Result<Scale> scale_of(const Mesh& templ, const std::vector<Vector3>& start, double mm);
-/// The triangles of the target within 60 mm of the box around the start, without triangles of area
-/// 0. Fails: kInvalidArgument (too few triangles)
-/// Out: whole  for each of these triangles its index in `target`
+/// The triangles of the target whose middle is within 60 mm of the box around the start, without
+/// triangles of area 0.
+/// In:    start  the start positions in millimetres
+/// Out:   whole  for each of these triangles its index in `target`
+/// Fails: kInvalidArgument (too few triangles)
 core::Result<Target> near_target(const Mesh& target, const Points& start, const Scale& scale,
                                  std::size_t threads, std::vector<std::int32_t>& whole);
 /// Computes the properties of the template's vertices.

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Registers a template onto a target: coarse steps with matches by features, then fine steps with
+// matches by distance.
 #include "register/register.h"
 
 #include <array>

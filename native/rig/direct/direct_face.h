@@ -19,7 +19,7 @@
 namespace risorius::rig {
 
 /// The parts of a face. The armature may have more bones than the rig moves. These other bones have
-/// the transforms of the last call of `keep`.
+/// the transforms of the last call of `keep`; before the first call they stay in their rest pose.
 struct FaceParts {
   struct Mesh {
     std::shared_ptr<const Morph> morph;
@@ -29,8 +29,8 @@ struct FaceParts {
   std::shared_ptr<const Rig> rig;
   std::shared_ptr<const BoneSpace> space;
   std::shared_ptr<const JointChain> chain;
-  std::vector<std::uint32_t> rows;    // [bones of space]: its index in chain
-  std::vector<std::uint32_t> turned;  // bones of space to which a frame's turns are added
+  std::vector<std::uint32_t> rows;    // [bones of space]: index of the bone in chain
+  std::vector<std::uint32_t> turned;  // bones of space that FaceFrame::turns rotate in addition
   std::vector<Mesh> meshes;
 };
 
@@ -44,7 +44,8 @@ struct Target {
 };
 
 /// A frame of a face.
-/// raw    float32[R]; nullptr: the pose is given
+/// raw    float32[raw controls]; nullptr: `pose` is given
+/// lod    the LOD of the rig, clamped to the last one; without raw it is not read
 /// pose   with raw: the rig's output, null pointers are ignored; without raw: the input, joints and
 ///        blend_shapes are read
 /// turns  float32[turned, 4], quaternions w x y z in each bone's rest axes. They are multiplied
@@ -70,14 +71,16 @@ class DirectFace {
   /// Sets the transforms of all bones of FaceParts::chain: location [bones, 3], rotation [bones, 4]
   /// as w x y z, scale [bones, 3]. The bones that the rig moves get new transforms in each frame.
   void keep(const float* location, const float* rotation, const float* scale);
-  /// Sets the base vertices of a mesh, which its channels and bones then move.
+  /// Sets the base vertices of a mesh, which its channels and bones then move. The next frame
+  /// writes the mesh.
   /// In: mesh  below the number of meshes; base  float32[vertices, 3]
   void set_base(std::uint32_t mesh, const float* base);
   /// Makes the next frame write every mesh.
   void forget() noexcept;
 
   // The following functions are the steps of evaluate_faces.
-  /// Evaluates the rig and the bones, and finds the changes. Allocates nothing.
+  /// Evaluates the rig, unless the frame has a pose, and the bones, and finds the bones and
+  /// channels that changed. Allocates nothing.
   void begin(const FaceFrame& frame) noexcept;
   /// Whether the target must be written. Call it after begin.
   bool is_due(const FaceFrame& frame, const Target& target) const noexcept;
@@ -89,10 +92,11 @@ class DirectFace {
  private:
   struct Mesh {
     std::vector<std::uint32_t> starts;  // [channels, blocks + 1] into the deltas of the morph
-    std::vector<std::uint32_t> active;  // the channels of the morph that are not 0
+    // The channels whose weight is not 0, as indices into the channels of the morph.
+    std::vector<std::uint32_t> active;
     std::size_t active_count = 0;
-    std::uint64_t written = 0;  // the frame in which it was last written; 0: never
-    const float* out = nullptr;
+    std::uint64_t written = 0;   // the frame in which it was last written; 0: never
+    const float* out = nullptr;  // the address to which it was last written
   };
 
   explicit DirectFace(FaceParts parts);
@@ -104,7 +108,8 @@ class DirectFace {
   FaceParts parts_;
   std::vector<Mesh> meshes_;
   std::uint64_t frame_ = 0;
-  // The rig's workspace, and the controls of the pose.
+  // The rig's workspace, the last pose that it evaluated, and the raw controls and LOD of this
+  // pose.
   Workspace work_;
   Pose pose_;
   std::vector<float> raw_;
@@ -128,7 +133,8 @@ class DirectFace {
 /// threads.
 /// In:  faces    no face twice
 ///      frames   one for each face; their outputs may not overlap
-///      threads  number of threads; 0: one for each kWorthAThread vertices, at most one per core
+///      threads  number of threads, at most 64; 0: one for each 8,192 vertices of the targets, at
+///               most one per core
 void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> frames,
                     std::size_t threads);
 

@@ -13,7 +13,7 @@ namespace risorius::rig {
 
 /// Converts vectors of a file to another space: v' = scale * axes * v.
 struct SpaceConvention {
-  EulerConvention euler;
+  EulerConvention euler;                                 // of the file
   std::array<float, 9> axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  // rows; orthonormal, may mirror
   float scale = 1;
 };
@@ -26,8 +26,8 @@ struct BoneSpace {
   struct Bone {
     std::uint32_t joint;
     std::array<float, 3> neutral_angles;  // in the file's unit
-    Quaternion neutral_inverse;           // in the other space
-    std::array<float, 9> place;           // takes a translation from the file's space to the bone's
+    Quaternion neutral_inverse;           // inverse of the neutral rotation, in the other space
+    std::array<float, 9> place;           // matrix from a translation in the file to the bone's
   };
   SpaceConvention convention;
   std::uint32_t joint_count = 0;

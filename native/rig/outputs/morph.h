@@ -15,7 +15,7 @@ struct Morph {
   };
   std::uint32_t vertex_count = 0;
   std::uint32_t channel_count = 0;             // length of the weights
-  std::vector<std::uint16_t> channels;         // that have a target in this mesh, ascending
+  std::vector<std::uint16_t> channels;         // channels with a target in this mesh, ascending
   std::vector<std::uint32_t> channel_offsets;  // [channels + 1] into deltas
   std::vector<Delta> deltas;                   // by channel, then by vertex
 

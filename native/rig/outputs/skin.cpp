@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: MIT
+// Packs the weights of a mesh's vertices on bones for the skinning kernels, and deforms the
+// vertices. The vertices are divided into blocks of 1,024. In a block, the vertices with the same
+// number of influences, rounded up to a multiple of four, form a run, which is stored in groups of
+// four vertices.
 #include "rig/outputs/skin.h"
 
 #include <algorithm>
@@ -62,7 +66,8 @@ Status check_influences(const Lists& lists, std::uint32_t vertex_count, std::uin
   return core::ok();
 }
 
-// The sum of a vertex's weights, by which they are divided; 0 if the vertex does not move.
+// The sum of a vertex's weights, by which they are divided; 0 if the vertex does not move because
+// the sum is too small or infinite.
 float divisor(std::span<const float> weights) {
   const float sum = std::accumulate(weights.begin(), weights.end(), 0.0f);
   return sum > kLeastWeight && std::isfinite(sum) ? sum : 0.0f;
@@ -96,8 +101,10 @@ void put_vertex(const Lists& lists, std::size_t v, std::size_t at, std::size_t p
   }
 }
 
-// Adds a run: vertices of a block with the same number of influences. In: begin  first vertex of
-// the block
+// Adds a run: vertices of a block with the same number of influences, rounded up to fours.
+// In: begin     first vertex of the block
+//     vertices  the vertices of the run, relative to begin
+//     fours     number of groups of four influences of each vertex
 void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_t> vertices,
              std::uint32_t fours, Skin& skin) {
   skin.runs.push_back({static_cast<std::uint32_t>(vertices.size()), fours});
@@ -112,7 +119,8 @@ void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_
   }
 }
 
-// Adds a block with the vertices [begin, end), sorted by number of influences and then by index.
+// Adds a block with the vertices [begin, end), sorted by number of influences, rounded up to fours,
+// and then by index.
 void add_block(const Lists& lists, std::uint32_t begin, std::uint32_t end, Skin& skin) {
   std::vector<std::uint32_t> fours;
   for (std::uint32_t v = begin; v < end; ++v) fours.push_back(fours_of(weights_of(lists, v)));

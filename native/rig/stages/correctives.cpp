@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The stages that compute all other controls from the raw ones: networks, solvers and correctives.
+// A corrective is a product of other controls, its factors. A watched corrective is in the list of
+// one of its factors, its watcher, and is not visited while the watcher is 0.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -46,12 +48,13 @@ bool rests_any(const Rig& rig, const Psd& psd, auto rests) noexcept {
   return std::any_of(factors, factors + psd.factor_count, rests);
 }
 
-// Lists the watched correctives that may not be 0: their watcher and their second factor are not 0.
-// If the next evaluation has the same active controls, it also removes correctives with any factor
-// at 0 from the list; for a single evaluation this test takes longer than it saves.
+// Lists the watched correctives that can differ from 0, because their watcher and Watch::other are
+// not 0. If the evaluation before had the same active controls, its list is used again, and
+// correctives with any factor at 0 are removed from it; for a single evaluation this test takes
+// longer than it saves.
 // In:  kept    the evaluation before had the same active controls
 //      rests   rests(control): whether a control is 0
-// Out: work    firing
+// Out: work    firing, firing_count, fires_all
 template <class Rests>
 void list_firing(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                  bool kept, Workspace& work, Rests rests) noexcept {
@@ -82,16 +85,17 @@ class Correctives {
   Correctives(const Rig& rig, Workspace& work, float* controls)
       : rig_(rig), work_(work), controls_(controls) {}
 
-  // Computes the watched correctives. In: active  controls that are not 0, without the correctives;
-  // kept  as in list_firing
+  // Computes the watched correctives.
+  // In: active  controls that are not 0, without the correctives
+  //     kept    the evaluation before had the same active controls
   void watched(std::uint32_t lod, std::span<const std::uint16_t> active, bool kept) noexcept {
     const auto rests = [this](std::uint16_t control) { return controls_[control] == 0.0f; };
     list_firing(rig_, lod, active, kept, work_, rests);
     for (std::size_t i = 0; i < work_.firing_count; ++i) {
       const Psd& psd = rig_.psds[work_.firing[i]];
       const float value = corrective(rig_, psd, controls_);
-      // The value is 0 times NaN. It must be 0 here, because other evaluations skip a corrective
-      // with a factor at 0.
+      // A product of 0 and NaN or infinity is NaN. The corrective must be 0 here, because other
+      // evaluations skip a corrective with a factor at 0.
       if (std::isnan(value) && rests_any(rig_, psd, rests)) continue;
       set(psd.output, value);
     }
@@ -135,10 +139,10 @@ std::uint32_t touch_column(const Rig& rig, std::uint32_t column) noexcept {
   return rig.is_half() ? rig.joint_halves[at] : std::bit_cast<std::uint32_t>(rig.joint_values[at]);
 }
 
-// Reads one value of every list that these controls will need. These reads do not depend on each
-// other, so that a cold cache loads them in parallel, and their pages are in memory when the
-// columns are read. In a batch only the first frame does it, because the other frames need mostly
-// the same memory.
+// Reads one value of every list (columns and watched correctives) of the given controls. These
+// reads do not depend on each other, so that a cold cache loads them in parallel, and their pages
+// are in memory when the columns are read. In a batch only the first frame does it, because the
+// other frames need mostly the same memory.
 void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> controls,
            Workspace& work) noexcept {
   const std::uint32_t* watches =
@@ -159,8 +163,9 @@ void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> con
   work.touched = sum;
 }
 
-// Calls touch(), unless the evaluation before had the same active controls. Then its lists are used
-// again; they list the columns in one run of memory, so that touch() is not needed.
+// Calls touch(), unless the cache is warm (work.warm) or the evaluation before had the same active
+// controls. In the second case its lists are used again; they list the columns in one run of
+// memory, so that touch() is not needed.
 // Out: whether the evaluation before had the same active controls
 bool reach(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
            Workspace& work) noexcept {
@@ -227,8 +232,10 @@ bool any_negative_0(const float* values, std::size_t count) noexcept {
   return std::any_of(values, values + count, [](float v) { return v == 0.0f && std::signbit(v); });
 }
 
-// Lists the raw controls that are not 0 in at least one frame.
-// Out: signs  whether any value has its sign bit set
+// Lists in work.active the raw controls that are not 0 in at least one frame of work.frame_weights,
+// and sets their bits in work.union_bits.
+// Out: signs    whether any value has its sign bit set
+//      returns  the number of listed controls
 std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   const float* values = work.frame_weights.data();
   std::uint64_t all = 0;
@@ -245,8 +252,9 @@ std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   return n;
 }
 
-// Computes a corrective of four frames. Products and roundings have the same order as in
-// corrective().
+// Computes a corrective of four frames. Products and roundings have the same order as for a single
+// frame, in corrective(). The result is 0 instead of NaN in frames in which a factor is 0.
+// In: values  [controls, kFrames], from the first of the four frames on
 simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
                             const float* values) noexcept {
   simd::Four product = simd::Four::all(psd.weight);
@@ -267,7 +275,8 @@ simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
 
 // Computes the listed correctives of all frames.
 // In/out: values  [controls, kFrames] all controls, frame after frame for each control
-//         bits    a bit for each corrective that is not 0 in some frame
+//         bits    [controls] bits: the bit of a corrective's output is set if the corrective is not
+//                 0 in some frame
 void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, float* values,
                        std::uint64_t* bits) noexcept {
   for (const std::uint16_t p : firing) {
@@ -283,8 +292,9 @@ void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, fl
   }
 }
 
-// Writes the controls of each frame: its raw controls, and the others from work. Out: controls
-// [count, controls]
+// Writes the controls of each frame: its raw controls, the active correctives from
+// work.frame_weights, 0 for the other correctives, and the initial values of all other controls.
+// Out: controls  [count, controls]
 void write_frames(const Rig& rig, const float* raw, std::size_t count, const Workspace& work,
                   float* controls) noexcept {
   const std::uint32_t correctives_end = rig.raw_count + rig.psd_count;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Instance: a face through time, as in the reference.
+// Instance: a face in a sequence of frames, with the state and the latency of the reference
+// evaluator.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +18,13 @@ class Instance {
  public:
   explicit Instance(const Rig& rig);
   std::uint32_t lod() const { return lod_; }
-  /// Changes the LOD, clamped to the last one. Another LOD resets all controls except the raw ones
-  /// to their initial values, as in the reference evaluator.
+  /// Changes the LOD, clamped to the last one. Another LOD, or any LOD beyond the last one, resets
+  /// the pose to rest and all controls except the raw ones to their initial values, as in the
+  /// reference evaluator.
   void set_lod(std::uint32_t lod) noexcept;
   const Pose& evaluate(const float* raw) noexcept;
   /// One value for each region, mesh after mesh. At 0 the networks of the region are skipped and
-  /// their outputs keep their initial values. Other values have no effect.
+  /// their outputs are 0, or 1 for the w of a joint's quaternion. Other values have no effect.
   std::span<const float> masks() const { return work_.masks; }
   /// In: index below the number of masks.
   void set_mask(std::size_t index, float value) noexcept;
@@ -35,7 +37,7 @@ class Instance {
   bool at_rest_ = false;  // the pose belongs to the raw controls and would not change
   Workspace work_;
   Pose pose_;
-  std::vector<float> before_;  // the controls of the frame before
+  std::vector<float> before_;  // the controls when an evaluation begins: new raw ones, old others
 };
 
 }  // namespace risorius::rig

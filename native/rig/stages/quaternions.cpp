@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Joints rotated by quaternions, and Euler angles as quaternions. From: dna-format 12.5
+// Quaternion joints, which are turned by the product of the rotations of their columns, one for
+// each control; and joints whose Euler angles are converted to quaternions. From: dna-format 12.5
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -62,8 +63,8 @@ void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work,
                            rig.joint_stride);
 }
 
-// Rotates the quaternion joints: multiplies the rotations of the active columns in the order of the
-// file, each from the left.
+// Rotates the quaternion joints: multiplies the rotations of the active columns in the order of
+// quaternion_columns, each from the left.
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept {
   if (rig.quaternion_joints.empty()) return;

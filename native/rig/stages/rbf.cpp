@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Radial solvers, computed in double: an arc cosine near 1 loses half of its digits.
+// Radial solvers, which weight their poses by the distances of the input controls from the targets
+// of the poses. Computed in double: an arc cosine near 1 loses half of its digits.
 // From: dna-format 12.4
 #include "rig/stages/rbf.h"
 
@@ -59,7 +60,7 @@ double kernel(std::uint32_t function, double d, double r) noexcept {
 
 double clamp01(double v) { return v < 0.0 ? 0.0 : (v > 1.0 ? 1.0 : v); }
 
-// Computes the weights of the poses before scale and threshold.
+// Computes the weights of the poses before normalization, scale and threshold.
 // Out: near    kernel value of each pose's distance
 //      values  weights; the sum of the weights is returned
 double pose_values(const Rig& rig, const RbfSolver& s, const double* inputs, double* near,
@@ -91,7 +92,8 @@ void gather_inputs(const Rig& rig, const RbfSolver& s, const float* controls,
   convert_rbf_inputs(s.distance, s.axis, inputs, s.input_count);
 }
 
-// The factor that makes the weights of the poses sum to 1, or 1 if they need not.
+// The factor for the weights of all poses. It makes them sum to 1 if their sum is above 1, or if
+// the solver always normalizes and the sum is not 0; otherwise it is 1.
 double ratio_of(const RbfSolver& s, double sum) noexcept {
   const bool normalize = sum > 1.0 || (s.always_normalize != 0 && sum != 0.0);
   return normalize ? 1.0 / sum : 1.0;

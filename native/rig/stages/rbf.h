@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Radial solvers: their arithmetic, shared with the compiler, which inverts the matrices of their
-// targets; and the weights of their poses for explanations.
+// Radial solvers, which weight their poses by the distances of the input controls from the targets
+// of the poses. The compiler shares their arithmetic, because it inverts the matrices of the
+// weights between targets; solver_poses() explains the weights of a result.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,8 @@ namespace risorius::rig {
 enum RbfDistance : std::uint32_t { kEuclidean, kQuaternion, kSwingAngle, kTwistAngle };
 
 /// For the distances of swing or twist angles: reduces each quaternion (x y z w) of values to its
-/// swing or twist about the axis, in place. For other distances: does nothing.
+/// swing or twist about the axis (0 x, 1 y, 2 z), in place. For other distances: does nothing.
+/// In: values  [count], one quaternion after the other
 void convert_rbf_inputs(std::uint32_t distance, std::uint32_t axis, double* values,
                         std::size_t count) noexcept;
 /// The distance between two inputs that convert_rbf_inputs has converted: the length of their
@@ -33,7 +35,8 @@ double rbf_kernel(std::uint32_t function, double distance, double radius) noexce
 ///      controls  float32[controls] of an evaluated pose
 ///      work      of make_workspace
 /// Out: distances, weights  [poses of the solver]: distances of rotations are in radians; weights
-///                          as the solver writes them, 0 if not above the threshold
+///                          without the factors of the input and output controls of a pose, 0 if
+///                          not above the threshold
 void solver_poses(const Rig& rig, std::uint32_t index, const float* controls, Workspace& work,
                   double* distances, float* weights) noexcept;
 

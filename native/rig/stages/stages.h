@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The stages of an evaluation. Private to native/rig/stages.
+// The stages of an evaluation. Private to native/rig/stages. A control is active if it is not 0.
+// Its columns, the coefficients of the joint groups, are summed to rows, one for each joint
+// attribute that a group moves.
 #pragma once
 
 #include <array>
@@ -20,7 +22,8 @@ std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept;
 ///               their initial values
 ///     lod       below the number of LODs, as in all functions below
 void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
-/// As settled_controls, but with the latency of the reference evaluator.
+/// As settled_controls, but with the latency of the reference evaluator: networks, then solvers,
+/// then correctives run, and each reads the results of later stages from the frame before.
 /// In: controls  the raw controls are set, all others have the values of the frame before
 void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
 /// Copies the raw controls, sets all other controls to their initial values, and calls
@@ -37,8 +40,9 @@ bool go_together(const Rig& rig, std::uint32_t lod) noexcept;
 ///      work      of make_batch_workspace
 /// Out: controls  [count, controls] all controls of each frame
 ///      work      frame_weights; active: the controls that are not 0 in at least one frame
-///      false, and nothing is done, if a raw control is -0: its channels would get -0 if every
-///      channel reads its control, but +0 if only the channels of active controls are written
+///      returns   false, without these results, if a raw control is -0: its channels would get -0
+///                if every channel reads its control, but +0 if only the channels of active
+///                controls are written
 bool frame_controls(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                     Workspace& work, float* controls) noexcept;
 /// Lists the set bits of work.union_bits in work.active, and clears the bits.
@@ -51,8 +55,8 @@ void run_operation(const Rig& rig, std::uint32_t index, std::uint32_t lod, Works
 /// Runs one RBF solver. Overwrites the output controls of its poses.
 void run_solver(const Rig& rig, std::uint32_t index, Workspace& work, float* controls) noexcept;
 
-/// bits_of_eight combines eight floats by OR: the upper and the lower half of the result have the
-/// bits that any float of odd or even index has. kSigns are the sign bits of both halves.
+/// The sign bits of both halves of bits_of_eight(), which combines the bits of eight floats by OR:
+/// the floats with even index in one half of the result, the floats with odd index in the other.
 constexpr std::uint64_t kSigns = 0x8000'0000'8000'0000;
 inline std::uint64_t bits_of_eight(const float* numbers) noexcept {
   std::uint64_t pairs[4];
@@ -72,14 +76,15 @@ void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView&
 void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept;
 
-/// The following stages run after the joint groups; a batch runs them frame by frame. rotations()
-/// calls euler_joints() and the three functions after it, in this order.
+/// rotations() runs after the joint groups, in a batch frame by frame. It calls euler_joints(), if
+/// poses have quaternions, then quaternion_joints(), twist_and_swing() and ml_joints().
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work, float* joints) noexcept;
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept;
 void twist_and_swing(const Rig& rig, const PoseView& pose) noexcept;
 void ml_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept;
+/// Computes the blend shape channels and animated maps of one frame.
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const Workspace& work,
                        const PoseView& pose) noexcept;
 

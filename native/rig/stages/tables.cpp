@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Conditional tables: animated maps, and GUI controls to raw controls and back.
+// Conditional tables, which turn controls into animated maps, and GUI controls into raw controls
+// and back; and blend shape channels, which copy controls. A row of a table adds slope * input +
+// cut to its output while the input is between its bounds; neighbouring rows with the same input
+// and output form a run, of which the first row that applies counts.
 #include "rig/stages/tables.h"
 
 #include <algorithm>
@@ -53,7 +56,8 @@ bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
          active * kNamed + run * sizeof(float) < (shapes - run) * kLooked;
 }
 
-// Calls f(channel) for each channel of a control at the LOD.
+// Calls f(channel) for each channel of a control at the LOD. In: shapes  number of channels at the
+// LOD
 template <class F>
 void for_channels(const Rig& rig, std::uint32_t shapes, std::uint16_t control, F f) noexcept {
   const std::uint32_t end = rig.shape_begins[control + std::size_t{1}];

@@ -32,7 +32,7 @@ def read(report: Path) -> dict[str, Counter[str]]:
 
 
 def cell(counts: Counter[str]) -> str:
-    """The text of a cell, for example `18`, `17, 1 failed` or `16, 2 not run`."""
+    """The text of a cell: `18`, `17, 1 failed` or `16, 2 not run`; `-` if there is no test."""
     if not counts:
         return "-"
     extra = [f"{counts[kind]} {kind}" for kind in (FAILED, NOT_RUN) if counts[kind]]

@@ -87,7 +87,7 @@ def fetch(version: str, folder: Path) -> Path:
     Returns: path of the archive.
 
     Raises:
-        SystemExit: the SHA-256 differs; the archive is deleted.
+        SystemExit: the SHA-256 differs (the archive is deleted), or blender.org publishes none.
     """
     url, sums = address(version, *this_platform())
     archive = folder / url.rpartition("/")[2]

@@ -83,7 +83,7 @@ def try_old(read: Any, own: Any) -> tuple[int, int, str]:
 
 
 def moved(found: GlbFile, mesh: str) -> float:
-    """The largest distance in mm between a mesh's shape keys and the file's morph targets."""
+    """The largest difference of a coordinate between shape keys and the file's targets, in mm."""
     data: Any = bpy.data.objects[mesh].data
     if data.shape_keys is None:
         assert not found.names(mesh)

@@ -38,8 +38,8 @@ VERSIONS = {
     "native/python/risorius/base/version.py": r'^__version__ = "([^"]+)"',
     "addon/risorius/blender_manifest.toml": r'^version = "([^"]+)"',
 }
-# Largest size in bytes of a zip for one platform. The zip contains three wheels of 4 MB each, the
-# sample face of 8 MB, and small files.
+# Largest size in bytes of a zip for one platform. The zip contains at most three wheels of
+# 4 MB, a sample face of 8 MB, and small files.
 LARGEST = 24 << 20
 
 
@@ -161,6 +161,9 @@ def make_repository(out: Path, packages: list[Path]) -> None:
     Args:
         out: the folder; its content is deleted first.
         packages: one zip for each platform.
+
+    Raises:
+        SystemExit: Blender's tool fails or leaves out a zip.
     """
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)

@@ -24,7 +24,7 @@ def wheel_as(wheel: Path, old: str, new: str) -> Path:
 
     Args:
         wheel: path of the wheel, which is deleted.
-        old: its version.
+        old: version of the wheel.
         new: version of the copy.
     """
     target = wheel.with_name(wheel.name.replace(f"-{old}-", f"-{new}-", 1))

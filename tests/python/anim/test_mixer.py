@@ -58,7 +58,7 @@ def range_of(layer, clip):
 
 
 def moment(layer, clip, time):
-    """The scene time at which a layer is evaluated, extended or not; None if it has no effect."""
+    """The time in a layer's range that it shows at a scene time, in s; None: it has no effect."""
     start, end = range_of(layer, clip)
     if start <= time <= end:
         return time
@@ -83,7 +83,10 @@ def weight_at(layer, clip, t):
 
 
 def mixed(names, layers, time, base=None):
-    """The mixed controls at a time, by steps 1, 2 and 5 of the comment in mixer.h."""
+    """The mixed controls at a time, by steps 1, 2 and 5 of the comment in mixer.h.
+
+    That is without reactions and exclusive controls.
+    """
     out = np.zeros(len(names), np.float32) if base is None else np.array(base, np.float32)
     solo = any(layer.solo for layer in layers)
     for layer in layers:

@@ -98,7 +98,11 @@ def stretched(points):
 
 
 def posed(dna, mesh, **raw):
-    """float64[V, 3]: posed vertices, computed by the oracle and by the skinning of the tests."""
+    """float64[V, 3]: posed vertices, computed by the oracle and by the skinning of the tests.
+
+    Args:
+        raw: raw control without prefix -> value; the others keep their initial values.
+    """
     rig = risorius.Rig(dna)
     values = np.array(rig.initial_raw_controls, np.float64)
     for name, value in raw.items():

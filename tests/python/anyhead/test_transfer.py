@@ -22,7 +22,12 @@ NAMES = {"mouthSmileLeft": SMILE, "eyeBlinkLeft": BLINK, "jawOpen": "jawOpen"}
 
 
 def face(unit="cm", scale=1.0):
-    """(face in a unit, displacements of its three expressions in cm, and of its corrective)."""
+    """(face, displacements of its three expressions in cm, displacement of its corrective in cm).
+
+    Args:
+        unit: unit that the face states.
+        scale: factor of all lengths of the face in cm.
+    """
     points, faces = face_shapes.head()
     ways = {NAMES[n]: d for n, d in face_shapes.expressions(points).items() if n in NAMES}
     mesh = ObjMesh(scale * points, np.zeros((0, 2)), faces.tolist(), [[]] * len(faces))
@@ -40,11 +45,13 @@ def template():
 
 
 def on(template, points, target=None, **options):
-    """Transfer the template's expressions to a head.
+    """Transfer the template's expressions to a head, and return its displacements by pose.
 
     Args:
+        template: the TemplateFace to transfer from.
         points: positions of the template's vertices on the head.
         target: surface of the head; None: the template's triangles with these points.
+        options: fields of TransferOptions.
     """
     target = target or Surface(points, template.surface.triangles)
     return transfer(

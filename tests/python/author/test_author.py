@@ -39,7 +39,7 @@ from risorius.cli import main
 from risorius.cli.faces import author
 from risorius.controls import arkit
 
-# The module computes skinning and morphing from the format's description, without risorius.author.
+# oracle.py of the Blender tests computes skinning and morphing without risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)
@@ -68,12 +68,16 @@ def made(folder):
 
 
 def tolerated(times=1.0):
-    """The default tolerance of a vertex in cm, multiplied by a factor. Args: times  the factor."""
+    """The default tolerance of a vertex in cm, multiplied by the factor `times`."""
     return times * TOLERANCE * np.ptp(face_shapes.head()[0][:, 1])
 
 
 def posed(dna, controls):
-    """Posed vertices in metres. Args: controls  raw control without prefix -> value; others: 0."""
+    """Posed vertices in metres and in Blender's axes.
+
+    Args:
+        controls: raw control without prefix -> value; others are 0.
+    """
     rig = risorius.Rig(dna)
     names = list(dna.raw_control_names)
     values = np.zeros(len(names), np.float32)

@@ -274,7 +274,11 @@ def skin_of(read, controls, lod=0):
 
 
 def depth(positions):
-    """float64[V]: depth inside the ball in mm. Args: positions  float64[V, 3], mm."""
+    """float64[V]: depth inside the ball in mm; negative outside.
+
+    Args:
+        positions: float64[V, 3], mm.
+    """
     return RADIUS - np.linalg.norm(positions - BALL, axis=1)
 
 

@@ -24,7 +24,14 @@ ORDER, ORDERS = 4, ("XYZ", "XZY", "YZX", "YXZ", "ZXY", "ZYX")
 
 
 def turned(points, degrees, order="XYZ", back=False):
-    """Points rotated by degrees about the axes in this order, or back, by Rodrigues' formula."""
+    """Points rotated about the axes by Rodrigues' formula.
+
+    Args:
+        points: float[V, 3].
+        degrees: angles about x, y and z.
+        order: the axis of each rotation, first to last.
+        back: whether to undo this rotation.
+    """
     for letter in reversed(order) if back else order:
         axis = "XYZ".index(letter)
         angle = np.radians(degrees[axis]) * (-1 if back else 1)

@@ -39,7 +39,11 @@ def made(name):
 
 
 def read(path, text=""):
-    """Read a head's file, or a spec of it. Args: text  lines for the spec's table [source]."""
+    """Read a head's file, or a spec of it.
+
+    Args:
+        text: lines for the spec's table [source]; "": read the file without a spec.
+    """
     if text:
         toml = path.with_suffix(".toml")
         toml.write_text(f'[source]\nneutral = "{path.name}"\n{text}', encoding="utf-8")
@@ -392,7 +396,13 @@ def test_a_folder_of_obj_files_is_a_head(tmp_path):
 
 
 def fbx_head(path, picture, *, embedded):
-    """Write a head, and eyes with two materials, as an FBX in centimetres."""
+    """Write a head, and eyes with two materials, as an FBX in centimetres.
+
+    Args:
+        path: path of the FBX.
+        picture: bytes of a PNG, the colour texture of the skin.
+        embedded: True: the FBX contains the PNG; False: it only names skin.png.
+    """
     points, faces, shapes = likenesses.skull()
     eyes = likenesses.joined(*likenesses.eyes())
     objects, links = [], []

@@ -20,7 +20,7 @@ from risorius.author import (
 from risorius.author.input import spec
 from risorius.base.errors import ArgumentError
 
-# The module computes skinning and morphing from the format's description, without risorius.author.
+# oracle.py of the Blender tests computes skinning and morphing without risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle_like", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)

@@ -28,7 +28,12 @@ def rows(array, stride):
 
 
 def numbers():
-    """Quantized positions, displacements and texture coordinates of the head of face_shapes."""
+    """Quantized numbers of the head of face_shapes.
+
+    Returns:
+        The lower corner in m; positions from the corner, in steps of STEP; shape -> displacements
+        in steps of STEP; texture coordinates in steps of 1 / 4095.
+    """
     positions, _ = face_shapes.head()
     low = positions.min(axis=0) / 100
     whole = np.round((positions / 100 - low) / STEP).astype("<u2")
@@ -293,7 +298,7 @@ def test_every_odd_value_of_the_json_is_one_sentence_that_names_the_file(tmp_pat
 
     everywhere = []
     head(path, packed=True, change=lambda document: everywhere.extend(places(document)))
-    everywhere = [at for at in everywhere if at and at[0] != "buffers"]  # written last
+    everywhere = [at for at in everywhere if at and at[0] != "buffers"]  # save() replaces them
     refused = 0
     for at in everywhere:
         head(path, packed=True, change=functools.partial(spoil, at=at))

@@ -40,7 +40,14 @@ def settable_of(body: list[ast.stmt]) -> set[str]:
 
 
 def differences(stub: str, module) -> list[str]:
-    """A sentence for each name that the stub lacks or that only the stub has."""
+    """A sentence for each name that only one of both has or describes differently.
+
+    A description differs if only one of both is a class, or if a property can be set in only one.
+
+    Args:
+        stub: text of the type stub.
+        module: the imported module.
+    """
     top = names_of(ast.parse(stub).body)
     real = {n: v for n, v in vars(module).items() if not n.startswith("_")}
     out = [f"the stub lacks {n}" for n in real.keys() - top.keys()]

@@ -131,7 +131,14 @@ def words_for(name):
 
 
 def tells(difference, name):
-    """Whether a difference describes a property, its parent or a part of it."""
+    """Whether a difference belongs to a property, its parent or a part of it, and names it.
+
+    Its text must match words_for(name).
+
+    Args:
+        difference: a result of compare().
+        name: dotted name of the property, without indices.
+    """
     # Differences of skin joints and weights are reported as differences of skin_offsets.
     field = re.sub(r"meshes\.skin_(joint_indices|weights)", "meshes.skin_offsets", difference.field)
     name = re.sub(r"meshes\.skin_(joint_indices|weights)", "meshes.skin_offsets", name)
@@ -140,7 +147,7 @@ def tells(difference, name):
 
 
 def every_change(dna):
-    """Yields (path of a field, changed rig) for every change of one field that changes the file."""
+    """Yields (path of a field, changed Dna) for each value of others() that changes the file."""
     base = dna.to_bytes()
     for path, value in fields(dna):
         for other in others(value):
@@ -160,7 +167,7 @@ MOST = {"full": sys.maxsize, "tiny": 4}
 
 
 def spread_changes(dna, most):
-    """Up to `most` changes of each field, spread over its values: (name, changed rig)."""
+    """Up to `most` changes of each field, spread over its values: (name, changed Dna)."""
     changes = {}
     for path, other in every_change(dna):
         changes.setdefault(name_of(path), []).append(other)
@@ -227,9 +234,9 @@ def test_any_two_files_of_the_collection_differ():
 
 
 def reordered(dna, order):
-    """The same rig with its joints in another order.
+    """The same Dna with its joints in another order.
 
-    Args: order  for each new joint, its index in the old list.
+    order: for each new joint, its index in the old list.
     """
     out = copy.deepcopy(dna)
     new = np.argsort(order)

@@ -84,7 +84,8 @@ def test_majority_of_a_group():
 def chain(**changes) -> risorius.Dna:
     """A chain of three joints listed children first: tip, its parent middle, whose parent is root.
 
-    Args: changes  properties of the Dna to replace.
+    Args:
+        changes: properties of the Dna to replace.
     """
     dna = risorius.Dna()
     dna.rotation_unit, dna.coordinate_system = "degrees", ("right", "up", "front")

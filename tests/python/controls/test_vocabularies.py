@@ -31,8 +31,9 @@ def spelled(kind):
     return out
 
 
-# Three counts for each program: all its names; the names that `author` recognises by their words,
-# without a table of this program; the names in the best mapping for clips.
+# Number of names of each program. The second and third number are not tested. They are from the
+# time before the table of vocabularies: how many names `author` recognised by their words alone,
+# and how many the mapping for clips that knew most of them contained.
 COUNTS = {
     "arkit": (52, 52, 52), "oculus": (15, 0, 15), "vrchat": (18, 0, 7), "vrm0": (17, 3, 17),
     "vrm1": (18, 3, 18), "vroid": (57, 0, 0), "cc4": (155, 16, 27), "cc3": (108, 6, 13),

@@ -142,9 +142,8 @@ def test_faces_turn_with_handedness_and_winding(name):
 
 
 def raw_controls(dna, rng):
-    """Random raw controls. Those of quaternions give the identity, because a quaternion's axes
-
-    depend on the coordinate system.
+    """Random raw controls. Controls of quaternions give the identity, because the axes of a
+    quaternion depend on the coordinate system.
     """
     raw = rng.uniform(-0.2, 1.2, len(dna.raw_control_names)).astype(np.float32)
     for i, name in enumerate(dna.raw_control_names):
@@ -273,7 +272,10 @@ def test_quaternion_joints_map_for_all_controls_at_once(seed):
 
 
 def converted_columns(dna, target):
-    """For each group, joint -> converted (translations, rotations, scales) of its columns."""
+    """For each group, joint -> converted (translations, rotations, scales) of its columns.
+
+    Shapes are [columns, 3], [columns, 3, 3] (matrices for row vectors) and [columns, 3].
+    """
     source = oracle.system_of(dna)
     c, unit = oracle.change(source, target), oracle.scale_of_unit(source, target)
     out = []

@@ -18,7 +18,7 @@ MALFORMED = SHARED / "data" / "golden" / "malformed"
 
 
 def small():
-    """A face with every layer that has a class, made through the public classes."""
+    """A face of 2 joints, 2 raw controls, a corrective and a mesh, made by the public classes."""
     dna = risorius.Dna(name="small", lod_count=1, gender="female", age=30)
     dna.coordinate_system = ("right", "up", "front")
     dna.metadata = {"licence": "CC0-1.0"}

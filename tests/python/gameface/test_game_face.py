@@ -60,7 +60,10 @@ def face(tmp_path_factory):
 
 
 def poses(face):
-    """Yields (target name, its raw controls, raw controls of the pose that it is added to)."""
+    """Yields (target name, raw controls of its pose, raw controls of the pose it starts from).
+
+    mouthClose starts from the open jaw, all others from the neutral pose.
+    """
     there = set(risorius.load(face).raw_control_names)
     for name, row in arkit.mapping().items():
         raw = {control: value for control, value in row.items() if control in there}

@@ -67,7 +67,15 @@ def test_gltf_with_its_buffer_beside_or_inside(tmp_path, where):
 
 
 def small(times, values, channel, way="LINEAR", kind=5126):
-    """A glTF with a sampler, and a mesh with two morph targets: (document, bytes of its buffer)."""
+    """A glTF with a sampler, and a mesh with two morph targets: (document, bytes of its buffer).
+
+    Args:
+        times: times of the keys in seconds.
+        values: output values of the sampler in the file's order.
+        channel: JSON of the channel's target.
+        way: interpolation: LINEAR, STEP or CUBICSPLINE.
+        kind: component type of the values: 5126 (float32) or 5121 (uint8, normalized).
+    """
     dtype = {5126: "<f4", 5121: "<u1"}[kind]
     first, second = np.array(times, "<f4").tobytes(), np.array(values, dtype).tobytes()
     binary = first + second

@@ -67,7 +67,14 @@ class Reader(ast.NodeVisitor):
                             self.values.setdefault(target.id, []).append(value)
 
     def add(self, node: ast.expr | None, context: str, only_plain: bool = True) -> None:
-        """Add to `found` all texts that an expression may evaluate to."""
+        """Add to `found` all texts that an expression may evaluate to.
+
+        Args:
+            node: the expression; None: no text.
+            context: context of the translation, "Risorius" or "*".
+            only_plain: True: the place of an f-string is added to `hidden`; False: f-strings are
+                ignored.
+        """
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             if any(letter.isalpha() for letter in node.value):
                 self.found[context, node.value] = f"{self.path.name}:{node.lineno}"

@@ -93,7 +93,10 @@ def test_the_changelog_has_the_present_version(make):
 
 @pytest.fixture(scope="module")
 def made(make, tmp_path_factory):
-    """(folder, version, zips, the same zips made again), with empty wheels, and a repository."""
+    """(folder, version, zips of fake wheels, the same zips made again).
+
+    folder / "repository" is a repository of all zips except the first.
+    """
     folder = tmp_path_factory.mktemp("release")
     version = tomllib.loads((PROJECT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
     wheels = [

@@ -160,7 +160,10 @@ def packed():
 
 
 def skinned(dna, rig, raw, mesh_index, lod):
-    """Vertices of a mesh by linear blend skinning in float64, computed without the package."""
+    """Vertices of a mesh for the pose that the rig evaluates, float64[V, 3] in the file's unit.
+
+    Blend shapes and linear blend skinning are computed without the package.
+    """
     pose = rig.evaluate(raw, lod=lod)
     mesh = dna.meshes[mesh_index]
     p = np.asarray(mesh.positions, float).copy()
@@ -363,7 +366,10 @@ def test_extra_the_packed_face_has_what_all_expressions_ask_for(packed):
 
 
 def _carried(dna, mesh_name):
-    """Sums of each vertex's weights on spine, neck_01, neck_02 and head joints, float64[V, 4]."""
+    """Sums of each vertex's weights on spine, neck_01, neck_02 and head, float64[V, 4].
+
+    The weight of any other joint counts for the first of these four among its ancestors.
+    """
     carriers = ["spine_04", "neck_01", "neck_02", "head"]
     mesh = dna.meshes[dna.mesh_names.index(mesh_name)]
     out = np.zeros((len(mesh.positions), len(carriers)))

@@ -84,7 +84,10 @@ def test_the_picture_of_an_eye_gives_most_of_itself_to_the_iris():
 
 @pytest.fixture(scope="module")
 def faces():
-    """Bodies of the girl and of the man from whom all people are made; base mesh with eyeballs."""
+    """Two results: the bodies by name, and the base mesh with eyeballs.
+
+    The bodies are "girl" and "model". The model is the man from whom all people are made.
+    """
     girl = sample_people.body("girl")
     return {"girl": girl, "model": girl.man}, with_eyeballs(sample_people.data().base_mesh())
 

@@ -190,8 +190,7 @@ def stage():
     """A face with one flat mesh, which is 2 decimetres wide.
 
     The control `rise` raises the mesh by 0.1 decimetres from x = 0.2 on, with a slope from x =
-    0.15;
-    the control `idle` moves nothing.
+    0.15. The control `idle` moves nothing.
     """
     side = np.arange(41)
     x, z = np.meshgrid(0.05 * side - 1, 0.05 * side - 1, indexing="ij")
@@ -223,7 +222,10 @@ def stage():
 
 
 def _lying(dna, roots_x, way):
-    """Hairs of length 0.3 along x or -x (way 1 or -1), whose ends are 0.03 above the skin."""
+    """Hairs on the mesh of `stage` along x or -x (`way` 1 or -1), with roots at x = roots_x.
+
+    They reach 0.3 decimetres far, and end 0.03 decimetres above the skin at rest.
+    """
     n = len(roots_x)
     at = np.column_stack([roots_x, np.zeros(n), np.full(n, 0.02)])
     roots = nearest_places(dna.meshes[0].positions.astype(float), *corners_of(dna.meshes[0]), at)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Tests that rebuilt joint groups give the same poses, without small values of other regions.
+"""Tests that rebuilt joint groups give the same poses, apart from the values that were removed.
+
+With a threshold, regroup removes small values by which controls move joints of foreign regions.
 
 The test reads the joint groups of a file independently of the package: a dense matrix for each LOD,
 in which the last group that writes a row is used.
@@ -299,7 +301,8 @@ def test_quaternions_come_out_of_one_group_whole(name):
 def turning_face(*groups):
     """A face with two quaternion joints and two LODs.
 
-    Args: groups  joint groups: (rows of each LOD, control indices, output indices, values).
+    Args:
+        groups: joint groups: (rows of each LOD, control indices, output indices, values).
     """
     dna = risorius.Dna()
     dna.lod_count = 2
@@ -339,7 +342,17 @@ def test_products_of_quaternions_stay_in_their_order(case):
 
 
 def face_of_regions(seed, regions=6, joints=12, controls=20):
-    """A face with one group: dense regions of joints, in random order, and small other values."""
+    """A face with one group: dense regions of joints, in random order, and small other values.
+
+    Args:
+        seed: seed of all random values.
+        regions: number of regions.
+        joints: number of joints per region.
+        controls: number of controls that move the joints of a region, of 60 in all.
+
+    Returns:
+        (the face, float32[rows, 60]: its values without the small ones, region of each joint).
+    """
     rng = np.random.default_rng(seed)
     count = regions * joints
     owner = rng.permutation(np.repeat(np.arange(regions), joints))
@@ -691,8 +704,8 @@ def test_a_full_scale_face():
 def _face_of(values):
     """A face with one joint group.
 
-    Args: values: float[joints, controls], effect of each control on the x translation of each
-    joint.
+    Args:
+        values: float[joints, controls], effect of each control on the x translation of each joint.
     """
     joints, controls = values.shape
     dna = risorius.Dna()

@@ -13,7 +13,7 @@ WIDTHS = [0, 1, LANES - 1, LANES, LANES + 1, 2 * LANES, 100]
 
 
 def random_group(rng, dna, control_count, rows, columns):
-    """A joint group with zeros, several columns of the same control, and fewer rows at each LOD."""
+    """A joint group with zeros, several columns of a control, and fewer rows at some LODs."""
     values = rng.uniform(-3, 3, (rows, columns)) * (rng.random((rows, columns)) < 0.7)
     lods = sorted((int(n) for n in rng.integers(0, rows + 1, dna.lod_count - 1)), reverse=True)
     return risorius.JointGroup(

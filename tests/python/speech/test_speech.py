@@ -60,7 +60,18 @@ def voice(tmp_path):
 
 
 def wav(kind, bits, channels, rate, body, *, block=None, size=None, extra=b""):
-    """Bytes of a WAV file; block and size replace the correct values of its header."""
+    """Bytes of a WAV file.
+
+    Args:
+        kind: format code of the header: 1 for integers, 3 for floats.
+        bits: bits per sample.
+        channels: number of channels.
+        rate: samples per second.
+        body: the encoded samples.
+        block: bytes per frame in the header; None: the correct number.
+        size: bytes of the samples in the header; None: the correct number.
+        extra: further bytes of the format chunk.
+    """
     block = channels * bits // 8 if block is None else block
     form = struct.pack("<HHIIHH", kind, channels, rate, rate * block, block, bits) + extra
     chunks = b"fmt " + struct.pack("<I", len(form)) + form

@@ -47,7 +47,10 @@ def camel(name: str) -> str:
 
 
 def timecode(seconds: float, base: int) -> str:
-    """Seconds since midnight as HH:MM:SS:FF.sss: frames of 1 / base seconds, and thousandths."""
+    """Seconds since midnight as HH:MM:SS:FF.sss.
+
+    FF counts frames of 1 / base s, sss thousandths of a frame.
+    """
     units = round((seconds % 86400.0) * base * 1000)
     frames, rest = divmod(units, 1000)
     whole, frame = divmod(frames, base)
@@ -62,7 +65,15 @@ def live_link_face(
     names: list[str] = COLUMNS,
     count: int | None = None,
 ) -> str:
-    """CSV text of a take. rows: [frames, names]; seconds: times of the frames since midnight."""
+    """CSV text of a take.
+
+    Args:
+        rows: values of the columns, float[frames, names].
+        seconds: times of the frames since midnight, in seconds.
+        base: frames per second of the timecode.
+        names: names of the columns after BlendShapeCount.
+        count: number that the column BlendShapeCount states; None: the number of names.
+    """
     lines = ["Timecode,BlendShapeCount," + ",".join(names)]
     stated = len(names) if count is None else count
     for at, row in zip(seconds, rows, strict=True):
@@ -71,7 +82,10 @@ def live_link_face(
 
 
 def capture(count: int, names: list[str] = COLUMNS) -> np.ndarray:
-    """Values [count, names] in 0 to 1 with 10 decimals, by column; rotations in -0.6 to 0.6."""
+    """Sine curves for `count` frames, float64[count, names], rounded to 10 decimals.
+
+    Values lie in 0 to 1, and in -0.6 to 0.6 in columns whose name ends with Yaw, Pitch or Roll.
+    """
     at = np.arange(count)[:, None]
     column = np.arange(len(names))[None, :]
     values = 0.5 + 0.5 * np.sin(0.11 * at + 0.7 * column)
@@ -127,7 +141,10 @@ def unreal_animation(curves: dict[str, dict[float, float]], mode: str = "RCIM_Li
 
 
 def rhubarb_tsv(cues: list[tuple[float, float, str]]) -> str:
-    """Rhubarb's TSV: start in seconds with two decimals, tab, shape; shape X at the end; LF."""
+    """Rhubarb's TSV: start in seconds, tab, shape; then X at the end of the last cue.
+
+    cues: (start in seconds, end in seconds, mouth shape); each cue begins where the last one ends.
+    """
     lines = [f"{start:.2f}\t{shape}\n" for start, _, shape in cues]
     return "".join(lines) + f"{cues[-1][1]:.2f}\tX\n"
 

@@ -46,7 +46,8 @@ def form(directions: np.ndarray, seed: int = 0, size: float = 12.0) -> np.ndarra
 
     Args:
         directions: float64[n, 3] unit vectors.
-        seed: 0: the template; other seeds change proportions and the places and heights of bumps.
+        seed: 0: the template; other seeds change proportions and the places, widths and heights of
+            bumps.
         size: half the height of the head, in any unit.
     """
     random = np.random.default_rng(seed)
@@ -87,7 +88,12 @@ def sphere(rows: int, columns: int, turn: float = 0.0) -> tuple[np.ndarray, np.n
 
 
 def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.ndarray]:
-    """Template, target, and the template's vertices at their true places on the target, [V, 3]."""
+    """Template, target, and the template's vertices at their true places on the target, [V, 3].
+
+    Args:
+        seed: seed of the target's proportions and bumps; 0: the same form as the template.
+        size: half the height of the target; half the height of the template is always 12.
+    """
     directions, triangles = sphere(30, 44)
     others, corners = sphere(47, 61, turn=0.9)
     template = Surface(form(directions), triangles)
@@ -95,7 +101,7 @@ def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.n
 
 
 def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 0) -> list:
-    """(vertex index, its position in `true`) for each landmark in MARKS.
+    """(template vertex at the landmark, its position in `true` plus an error) for each of MARKS.
 
     Args:
         template: head by formula.
@@ -111,7 +117,13 @@ def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 
 
 
 def errors(template: Surface, found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """float64[V]: distances from the true places in tangent planes, in the surface's unit."""
+    """float64[V]: for each vertex, the length of the part of `found - true` along the surface.
+
+    Args:
+        template: head with the triangles of both arrays.
+        found: float64[V, 3], positions to judge.
+        true: float64[V, 3], correct positions; their surface gives the tangent planes.
+    """
     normals = Surface(true, template.triangles).normals()
     away = found - true
     return np.linalg.norm(away - (away * normals).sum(1, keepdims=True) * normals, axis=1)
@@ -126,7 +138,12 @@ def generator():
 
 
 def random_person(seed: int, source):
-    """A person with random gender, age, build, origin and facial features."""
+    """A person with random gender, age, build, origin and facial features.
+
+    Args:
+        seed: the same seed gives the same person.
+        source: a risorius_people Source, whose target files are the possible features.
+    """
     from risorius_people.people import MAN
     from risorius_people.source import TARGETS
 

@@ -24,14 +24,16 @@ EYES = {"LeftEye": ("Head", 0.03, 1.68, 0.1), "RightEye": ("Head", -0.03, 1.68, 
 PIXEL = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
-TURN = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]])  # what exporters put above a skeleton
+TURN = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]])  # as exporters rotate a skeleton
 
 
 class BodyFile:
     """A body file. shown: name of a mesh -> its vertices at rest in metres, float64[V, 3]."""
 
     def __init__(self, *, unit=1.0, back=False, eyes=False, prefix="mixamorig:"):
-        """unit: length of a unit in metres; back: the body looks along -z; eyes: add eye bones."""
+        """unit: length of a unit in metres; back: the body looks along -z; eyes: add eye bones;
+        prefix: beginning of the names of bones.
+        """
         self.json = {"asset": {"version": "2.0"}, "nodes": [], "accessors": [], "bufferViews": [],
                      "meshes": [], "skins": [], "scene": 0, "scenes": [{"nodes": [0]}]}  # fmt: skip
         self.binary, self.shown = b"", {}
@@ -80,7 +82,14 @@ class BodyFile:
         )
 
     def add_skinned(self, name, places, joints, targets=()):
-        """Add a skinned mesh whose vertices are stored in a rotated, moved and scaled space."""
+        """Add a skinned mesh whose vertices are stored in a rotated, moved and scaled space.
+
+        Args:
+            name: name of the mesh's node.
+            places: vertices at rest in the file's unit, float64[V, 3]; V is 4.
+            joints: names of the two bones that carry the vertices, without prefix.
+            targets: names of morph targets; each one moves all vertices along the stored y axis.
+        """
         space = np.eye(4)
         space[:3, :3], space[:3, 3] = 2.0 * TURN.T, [0.1, 0.2, 0.3]
         own = np.c_[places, np.ones(len(places))] @ np.linalg.inv(space).T

@@ -141,7 +141,7 @@ def world_matrices(dna, deltas=None):
 
 
 def mapped_world(source, target, matrices):
-    """World matrices M in the target system: inverse(C) M C, with translations in its unit."""
+    """World matrices M in the target system: inverse(C) M C, lengths in the target's unit."""
     c = np.eye(4)
     c[:3, :3] = change(source, target)
     out = np.linalg.inv(c) @ matrices @ c

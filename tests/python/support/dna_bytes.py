@@ -48,7 +48,7 @@ class Cursor:
 
 
 class Face:
-    """A DNA file as arrays; vertices(controls, lod) returns posed vertices."""
+    """A DNA file as arrays; vertices(raw, lod) returns posed vertices in the file's unit."""
 
     def __init__(self, data):
         assert data[:3] == b"DNA"

@@ -33,8 +33,8 @@ CLASSES = {
 }
 CLASS_OF = {name: viseme for viseme, names in CLASSES.items() for name in names.split()}
 
-# Sounds that begin with a closed mouth. espeak reports the time at which the mouth opens again; the
-# silence before it belongs to the previous sound.
+# Sounds that begin with a closure of the lips or of the tongue. espeak reports the time at which
+# the closure opens; in espeak's times, the silence before it belongs to the previous sound.
 STOPS = {"p", "b", "t", "d", "k", "g", "tS", "dZ", "t2"}
 
 
@@ -48,7 +48,10 @@ class Spoken:
     times: list[float]
 
     def classes(self, at: np.ndarray) -> np.ndarray:
-        """The viseme class at each time in seconds, as an array of strings."""
+        """The viseme class at each time in seconds, as an array of strings.
+
+        "sil" before the first and after the last sound.
+        """
         visemes = np.array([CLASS_OF[name] for name in self.names])
         place = np.searchsorted(self.times, at, side="right") - 1
         found = visemes[np.clip(place, 0, len(visemes) - 1)]
@@ -102,7 +105,10 @@ def is_installed() -> bool:
 def say(text: str, voice: str = "en-us", speed: int = 175, pitch: int = 50) -> Spoken:
     """Synthesise a text.
 
-    Args: voice with its variant (en-us+f2), speed in words per minute, pitch 0 to 100.
+    Args:
+        voice: name of a voice, optionally with a variant (en-us+f2).
+        speed: words per minute.
+        pitch: 0 to 100.
     """
     found = _library()
     assert found is not None

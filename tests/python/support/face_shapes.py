@@ -52,7 +52,13 @@ def write_obj(path, positions, faces):
 
 
 def write_all(folder, joints=40, more=""):
-    """Write neutral.obj, shapes/*.obj and spec.toml to a folder. Returns the path of spec.toml."""
+    """Write neutral.obj, shapes/*.obj and spec.toml to a folder. Returns the path of spec.toml.
+
+    Args:
+        folder: folder that has no folder "shapes" yet.
+        joints: number of joints in the section [joints] of spec.toml.
+        more: further text of spec.toml, after the number of joints.
+    """
     positions, faces = head()
     (folder / "shapes").mkdir(parents=True)
     write_obj(folder / "neutral.obj", positions, faces)

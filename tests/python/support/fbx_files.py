@@ -64,7 +64,16 @@ def fbx(tops, version: int = 7400) -> bytes:
 
 
 def curve(identity: int, times, values, flags=LINEAR, slopes=None):
-    """Record of an AnimationCurve. slopes: float[keys, 2], after the key and before the next."""
+    """Record of an AnimationCurve.
+
+    Args:
+        identity: number of the object in the file.
+        times: times of the keys in seconds.
+        values: values of the keys.
+        flags: attributes of all keys: LINEAR, CONSTANT or CUBIC, with USER or AUTO.
+        slopes: float[keys, 2], per second: after the key and before the next key. None: all keys
+            share one entry of attributes with slopes 0.
+    """
     count = len(times)
     data = np.zeros((count if slopes is not None else 1, 4), "<f4")
     if slopes is not None:
@@ -86,7 +95,16 @@ def curve(identity: int, times, values, flags=LINEAR, slopes=None):
 
 
 def animation(tracks, *, version=7400, stacks=("Take 001",), time_mode=3):
-    """Bytes of an FBX file. tracks: (kind, object, property, {component: curve record}, stack)."""
+    """Bytes of an FBX file with curves.
+
+    Args:
+        tracks: rows (kind, object, property, {component: curve record}, stack): class of the
+            object with an optional subclass after a slash, name of the object, animated property,
+            results of `curve`, index in `stacks`.
+        version: version of the format, 7400 for 7.4.
+        stacks: names of the animation stacks.
+        time_mode: FBX's number for the frame rate of the scene.
+    """
     objects, links, ids = [], [], iter(range(1000, 9999))
     layers, owners = [], {}
     for name in stacks:

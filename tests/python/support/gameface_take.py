@@ -37,7 +37,15 @@ def driven(weights, table):
 
 
 class Posed:
-    """Vertices of a .glb for target weights, and the rig's vertices in the same order."""
+    """Vertices of a .glb for target weights, and the rig's vertices in the same order.
+
+    Args:
+        dna: the face.
+        rig: its compiled rig.
+        found: GlbFile of the exported face.
+        lod: LOD of the rig's meshes.
+        facing_back: True: the exported face is rotated by 180 degrees about y.
+    """
 
     def __init__(self, dna, rig, found, lod, *, facing_back=False):
         self.rig, self.found = rig, found
@@ -78,13 +86,21 @@ class Posed:
         return raws
 
     def _own(self, mesh, raw):
-        # The sample face has glTF's axes and centimetres, so only its unit is converted to metres.
+        # The sample face has glTF's axes and is in cm: it is converted to metres, and rotated only
+        # if facing_back.
         found = self._surface.positions(raw, self._number[mesh]).astype(np.float64)
         return found * self._sides / 100
 
 
 def frames(path, take, *, lod, every):
-    """Largest errors in mm, float64[n, 2], of the sum without and with combination targets."""
+    """Largest errors in mm, float64[n, 2], of the sum without and with combination targets.
+
+    Args:
+        path: path of the DNA file.
+        take: path of a Live Link Face recording.
+        lod: LOD that is exported and compared.
+        every: step between compared frames; the result has one row for each of them.
+    """
     dna, rig = risorius.load(path), risorius.compile_cached(path)
     made = export(dna, rig, path, "face.glb", Wishes(shapes=("arkit",), lod=lod, within=0.5))
     table = json.loads(made.files["face.combinations.json"])

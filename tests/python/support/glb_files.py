@@ -26,8 +26,15 @@ class Glb:
     def packed(self, data, stride, mode="ATTRIBUTES", filter_name="NONE", seen=True):
         """Add a buffer view that meshoptimizer compresses; its fallback buffer has no data.
 
-        `filter_name` names the filter that was already applied to the data. seen: state a
-        byteStride.
+        Args:
+            data: bytes to compress.
+            stride: bytes per element.
+            mode: mode of EXT_meshopt_compression.
+            filter_name: filter that was already applied to `data`.
+            seen: True: the buffer view states a byteStride.
+
+        Returns:
+            The index of the buffer view.
         """
         count = len(data) // stride
         packed = _native.pack_buffer(data, count, stride, mode, filter_name)
@@ -104,7 +111,18 @@ def world(points):
 
 
 def egg(path, *, sparse=True, change=None, matrices=None):
-    """Write the head of face_shapes as two primitives; the second one uses duplicated vertices."""
+    """Write the head of face_shapes as two primitives; the second one uses duplicated vertices.
+
+    Args:
+        path: path of the GLB.
+        sparse: True: displacements of the morph targets are sparse accessors.
+        change: function that changes the JSON before it is written.
+        matrices: values of an additional MAT4 accessor.
+
+    Returns:
+        Positions in m before the nodes' transform, float64[V, 3]; name of a shape -> displacements
+        in m; texture coordinates of all written vertices, which include the duplicates.
+    """
     positions, faces = face_shapes.head()
     moved = face_shapes.expressions(positions)
     triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

@@ -38,7 +38,9 @@ class GlbFile:
         return self.binary[begin : begin + view["byteLength"]]
 
     def numbers(self, number):
-        """Values of an accessor, float64[n, k]; asserts that they have the stated min and max."""
+        """Values of an accessor, float64[n, k]; checked against min and max if the file states
+        them.
+        """
         about = self.json["accessors"][number]
         kind, width = np.dtype(_KINDS[about["componentType"]]), _WIDTHS[about["type"]]
         out = np.zeros((about["count"], width), kind)
@@ -79,7 +81,8 @@ class GlbFile:
         Args:
             name: name of the node that has the mesh.
             weights: morph target -> weight; all others are 0.
-            kind: attribute of the vertices to return; only positions are moved into the scene.
+            kind: attribute of the vertices to return; only positions are moved into the scene: by
+                the skin, or by the scale and translation of the node if it has no skin.
             world: node index -> float64[4, 4], world matrices of joints; None: at rest.
 
         """

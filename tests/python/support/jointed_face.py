@@ -19,7 +19,10 @@ TURNS = [f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw"]
 
 
 def build() -> risorius.Dna:
-    """Build the face; joints of both sides move symmetrically, except for a noise of 0.004 cm."""
+    """Build the face.
+
+    Joints of both sides move symmetrically, except for noise with a standard deviation of 0.004 cm.
+    """
     positions, _ = face_shapes.head()
     moved = face_shapes.expressions(positions)
     names = list(moved)

@@ -26,7 +26,7 @@ PROJECT = Path(__file__).resolve().parents[3]
 SOURCE = PROJECT / "tests" / "data" / "golden"
 TARGET = PROJECT / "native" / "python" / "risorius" / "selftest" / "golden"
 COMES_FROM = {"core": "core", "units": "units", "solvers": "tiny_v28"}
-CASES = 12  # per face, evenly spread over its golden cases
+CASES = 12  # per face, at least; evenly spread over its golden cases
 
 
 def rows_of(name):

@@ -14,7 +14,14 @@ FACTORS = 16  # larger than the number of factors of any corrective in the tests
 
 
 def table(conditionals, rows, values, output_count):
-    """Outputs [O] of a conditional table, and bounds [O] of their float32 errors."""
+    """Outputs [O] of a conditional table, and bounds [O] of their float32 errors.
+
+    Args:
+        conditionals: the Conditionals of a Dna.
+        rows: number of rows from the beginning of the table that are evaluated.
+        values: values of all inputs.
+        output_count: number O of outputs.
+    """
     out = np.zeros(output_count)
     size = np.zeros(output_count)
     columns = [
@@ -38,7 +45,15 @@ def table(conditionals, rows, values, output_count):
 
 
 def correctives(dna, controls, used, settle):
-    """Calculate in place the correctives whose index is in `used`."""
+    """Calculate in place the correctives whose index is in `used`.
+
+    Args:
+        dna: the Dna.
+        controls: float64 vector of all controls; its correctives are set.
+        used: indices of the controls that something reads.
+        settle: True: repeat until no corrective changes; False: correctives read the previous
+            values of other correctives.
+    """
     rows, columns, values = (
         np.asarray(a) for a in (dna.psds.rows, dna.psds.columns, dna.psds.values)
     )
@@ -135,6 +150,14 @@ def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
     Also sets their error bounds: float32 products of n unit quaternions err by about 8 (n + 2) eps,
     the reference's arc sine by 1e-6; both are divided by the squared cosine of the middle Euler
     angle.
+
+    Args:
+        dna: the Dna.
+        group: the joint group; only joints whose rotation it writes are calculated.
+        rows: number of rows of the group at the LOD.
+        inputs: values of the group's controls, one per column.
+        joints: float64[9 * J] joint values, in the file's units; changed.
+        bounds: float64[9 * J] error bounds of `joints`; changed.
     """
     matrix = np.asarray(group.values, float)
     outputs = np.asarray(group.output_indices)
@@ -166,7 +189,7 @@ def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
 
 
 def evaluate(dna, raw, lod, *, settle, controls=None, control_count=None):
-    """Evaluate in float64. Returns (values, bounds) of joints, shapes, maps and controls.
+    """Evaluate in float64. Returns (values, bounds) of each: joints, shapes, maps and controls.
 
     Args:
         dna: the Dna.
@@ -174,7 +197,7 @@ def evaluate(dna, raw, lod, *, settle, controls=None, control_count=None):
         lod: the LOD.
         settle: repeat the correctives until they no longer change.
         controls: vector of the previous evaluation, for one-frame latency; changed in place.
-        control_count: number of all controls; None: as many as the file has.
+        control_count: number of all controls; None: the file's raw controls and correctives.
     """
     count = control_count or len(dna.raw_control_names) + dna.psd_count
     if controls is None:

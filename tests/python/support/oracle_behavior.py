@@ -15,7 +15,7 @@ SEQUENCES = ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"]
 
 
 def multiply(a, b):
-    """The products of quaternions, float64[..., 4]."""
+    """The products of quaternions a b, float64[..., 4] in the order x, y, z, w."""
     # The formula is written out, because np.cross of three numbers takes fifty times as long.
     # Single quaternions are converted to Python floats, because NumPy scalars take ten times as
     # long.
@@ -41,7 +41,11 @@ def unit(q):
 
 
 def from_euler(sequence, signs, angles):
-    """Quaternions [..., 4] of Euler angles [..., 3] in radians, applied in the sequence's order."""
+    """Quaternions [..., 4] of Euler angles [..., 3] about x, y and z, in radians.
+
+    The rotations are about fixed axes. `sequence` is their order: "xyz" rotates about x first.
+    `signs` has a factor for the angle about each of x, y and z: 1 or -1.
+    """
     angles = np.asarray(angles, float)
     q = np.broadcast_to([0, 0, 0, 1.0], (*angles.shape[:-1], 4))
     for axis in ("xyz".index(a) for a in sequence):
@@ -160,7 +164,10 @@ def run_networks(dna, lod, c, masks):
 
 
 def reduced(q, method, axis):
-    """The twist about the axis (method 3) or the remaining swing (method 2) of a quaternion."""
+    """The twist about an axis (method 3) or the remaining swing (method 2) of a quaternion.
+
+    Methods 0 and 1 return the quaternion itself. `axis`: 0, 1 or 2.
+    """
     if method < 2:
         return q
     twist = np.zeros(4)
@@ -236,7 +243,7 @@ def solvers_of(dna):
 
 def run_solvers(dna, solvers, lod, c):
     poses = dna.rbf_behavior_ext.poses
-    first = len(c) - len(dna.rbf_behavior.poses)  # of files without layer rbfe
+    first = len(c) - len(dna.rbf_behavior.poses)  # first pose's control in files without layer rbfe
     for i in listed(dna.rbf_behavior.lod_solver_mapping, lod):
         solver = solvers[i]
         x = c[solver.solver.raw_control_indices].copy()
@@ -266,7 +273,10 @@ def initial_controls(dna, count):
 
 
 def frame(dna, solvers, c, lod, masks=None):
-    """Run one frame with the raw controls in `c`, and set all other controls in `c`."""
+    """Run one frame with the raw controls in `c`, and set all other controls in `c`.
+
+    masks: float[regions], 0 switches the networks of a region off; None: none is off.
+    """
     regions = sum(len(mesh) for mesh in dna.machine_learned_behavior.region_network_indices)
     run_networks(dna, lod, c, np.ones(regions) if masks is None else masks)
     run_solvers(dna, solvers, lod, c)
@@ -283,7 +293,11 @@ def used_controls(dna, lod):
 
 
 def settled(dna, solvers, raw, lod, count):
-    """Controls after frames have been repeated until none changes a control."""
+    """Controls after the frame has been repeated until it changes no control; `count`: their
+    number.
+
+    Raises an AssertionError if they still change after count + 2 frames.
+    """
     c = initial_controls(dna, count)
     for _ in range(count + 2):
         c[: len(raw)] = raw
@@ -357,6 +371,8 @@ def twist_swing_rotations(dna, c):
 
 def ml_values(dna, c, lod):
     """Joint -> (translation, quaternion, scale, Euler angles or None) that networks give it.
+
+    Euler angles are None if the networks output quaternions or have axes of their own.
 
     The values are in the DNA's axes.
     """

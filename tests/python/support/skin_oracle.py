@@ -10,7 +10,10 @@ SIDE = 14  # vertices along a side of the face's patch
 
 
 def skinned(dna, pose, mesh=0):
-    """Vertices of a posed mesh in the file's units, float64[V, 3]; rotation order x, y, z."""
+    """Vertices of a posed mesh in the file's units, float64[V, 3].
+
+    The file's angles are in degrees, with the rotation order x, y, z.
+    """
     geometry = dna.meshes[mesh]
     points = geometry.positions.astype(np.float64)
     for target in geometry.blend_shape_targets:
@@ -44,9 +47,10 @@ def _worlds(dna, deltas):
 def small_face():
     """A bent patch of 14 x 14 vertices, 13 cm wide and symmetric, with 6 joints.
 
-    Raw controls: jawOpen rotates a joint by 20 degrees; smileLeft and smileRight move two joints
-    sideways by 1 cm and up by 0.7 cm; puff is a blend shape; jawOpenTwin equals jawOpen; idle does
-    nothing; widen scales a joint. A corrective of jawOpen and smileLeft is another blend shape.
+    Raw controls: jawOpen rotates a joint by 20 degrees; smileLeft and smileRight each move one
+    joint sideways by 1 cm and up by 0.7 cm; puff is a blend shape; jawOpenTwin equals jawOpen; idle
+    does nothing; widen scales a joint. A corrective of jawOpen and smileLeft is another blend
+    shape.
     """
     across, up = np.meshgrid(np.arange(SIDE) - (SIDE - 1) / 2, np.arange(SIDE), indexing="ij")
     places = np.stack([across, up, 4 - 0.08 * across**2], axis=-1).reshape(-1, 3)

@@ -26,7 +26,8 @@ class Bezier:
         co: float64[keys, 2], frame and value of each key.
         left, right: float64[keys, 2], frame and value of each handle's end. The frame lies a third
             of the way to the neighbouring key, so that the value is a cubic polynomial of the
-            frame.
+            frame. The handles before the first and after the last key are unused; they lie one
+            frame away.
     """
 
     co: Float
@@ -51,8 +52,12 @@ def straight(frames: Float, values: Float) -> Bezier:
 class _Basis(NamedTuple):
     """Values of the cubic Bernstein polynomials for the fit of one cubic to a range of samples.
 
-    Each is float64[m]: values at all samples except the first and the last one, then at the
-    midpoints between neighbouring samples.
+    Except `solve`, each is float64[m]: values at all samples except the first and the last one,
+    then at the midpoints between neighbouring samples.
+
+    Attributes:
+        near, far: weights of the values of the first and of the second handle.
+        begin, end: weights of the values of the first and of the last sample.
     """
 
     near: Float
@@ -71,13 +76,17 @@ class Fitter:
     """
 
     def __init__(self, tolerance: float) -> None:
-        """Args: tolerance  largest distance of a curve from a sample, above 0."""
+        """Prepare fits.
+
+        Args:
+            tolerance: largest difference of a curve's value from a sample, above 0.
+        """
         self._most = max(tolerance - _ROUNDING, _ROUNDING)
         self._bases: dict[int, _Basis] = {}
         self._done: dict[tuple[bytes, bytes], Bezier] = {}
 
     def keys(self, frames: Float, values: Float) -> Bezier:
-        """Fits keys and handles to samples.
+        """Fit keys and handles to samples.
 
         From each key, a cubic covers as many later samples as it can. It may differ from a sample
         by at most the tolerance. Midway between two samples, it may differ from their mean by at
@@ -91,7 +100,8 @@ class Fitter:
             Bezier; each key has the value of its sample. If all samples are within the tolerance
             of the first sample, the curve has one key.
         """
-        known = frames.tobytes(), values.tobytes()  # left and right sides are mostly the same
+        # A left and a right control often have equal samples.
+        known = frames.tobytes(), values.tobytes()
         if known not in self._done:
             self._done[known] = self._fit(frames, values)
         return self._done[known]
@@ -103,7 +113,7 @@ class Fitter:
         return self.between(frames, values)
 
     def between(self, frames: Float, values: Float) -> Bezier:
-        """Like `keys`, but the first and the last sample have keys also if all values are equal.
+        """Fit keys and handles as `keys` does, but always with keys at the first and last sample.
 
         Args:
             frames: float64[n], ascending, n at least 2.
@@ -129,8 +139,14 @@ class Fitter:
     ) -> tuple[int, tuple[float, float]]:
         """Find how many samples one cubic covers.
 
-        Returns: index of the last sample that a cubic from sample `first` covers, and the values
-        of the two handles of this cubic.
+        Args:
+            frames, values: float64[n], all samples.
+            first: index of the sample at which the cubic begins.
+            even: whether the samples are equally spaced, so that cached matrices can be used.
+
+        Returns:
+            Index of the last sample that a cubic from sample `first` covers, and the values of the
+            two handles of this cubic.
         """
         low, high = values[first], values[first + 1]
         best = first + 1, (low + (high - low) / 3.0, high - (high - low) / 3.0)

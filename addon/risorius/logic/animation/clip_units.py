@@ -16,7 +16,8 @@ Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 NECK = ("neck.yaw", "neck.pitch", "neck.roll")
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
-TARGET = ("eyes.x", "eyes.y", "eyes.z")  # position of the gaze target in the gaze target's axes
+# Offset of the gaze target from its rest place, in Blender units and in the axes of its bone.
+TARGET = ("eyes.x", "eyes.y", "eyes.z")
 TURNS = {"head": HEAD, "neck": NECK, **{f"eye_{side}": names for side, names in EYES.items()}}
 BONES = (*(name for names in TURNS.values() for name in names), *TARGET)  # curves that move bones
 LAST_FRAME = 1_048_574  # Blender's own limit of a scene
@@ -43,7 +44,7 @@ class Timing:
     whole: bool = False
 
     def frames(self, seconds: Float) -> Float:
-        """Frames of the scene, as fractions, for seconds on the clip's clock."""
+        """Frames of the scene, with fractions, for seconds on the clip's clock."""
         return self.start + (np.asarray(seconds, np.float64) - self.origin) * self.rate
 
     def seconds(self, frames: Float) -> Float:
@@ -63,7 +64,7 @@ class Timing:
 def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
     """Convert samples at any time to keys on whole frames.
 
-    Each sample gives a key on the whole frame before it and one on the frame after it. So there are
+    A sample between two whole frames gives a key on each of them. So there are
     at most twice as many keys as samples, even if pauses between samples are long. At every whole
     frame, straight lines between keys have the values of straight lines between samples.
 
@@ -85,7 +86,11 @@ def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
 
 @dataclass
 class Curve:
-    """Keys of one F-curve: frames and values, float64[n] each; one key if all values are equal."""
+    """Keys of one F-curve: frames and values, float64[n] each; one key if all values are equal.
+
+    Attributes:
+        name: property name of the slider.
+    """
 
     name: str
     frames: Float
@@ -100,8 +105,10 @@ class Keys:
         controls: keys of the sliders, by their property names.
         turns: bone -> frames float64[n] and unit quaternions float64[n, 4], w first, in the axes of
             the control armature.
-        unknown: names of curves in the clip for which this face has no control.
-        dropped: number of samples that were not finite.
+        unknown: names of curves in the clip that are neither a control of this face nor an angle of
+            a bone.
+        dropped: number of samples that were left out because they were not finite. The angles of a
+            bone at one frame count as one sample.
     """
 
     controls: list[Curve] = field(default_factory=list)
@@ -154,7 +161,7 @@ def keys_of(
         worst = frames[np.argmax(np.abs(frames))]
         raise ClipError(
             told(
-                "frame {worst:.0f} is beyond what Blender can play (at most frame {last_frame})",
+                ("frame {worst:.0f} is beyond what Blender can play (at most frame {last_frame})"),
                 worst=worst,
                 last_frame=LAST_FRAME,
             )
@@ -257,7 +264,7 @@ def multiply(a: Float, b: Float) -> Float:
 
 
 def near_signs(turns: Float) -> Float:
-    """The same rotations, each quaternion with the sign that is nearest to its predecessor."""
+    """Quaternions float64[n, 4], each negated where that makes it nearer to its predecessor."""
     flips = np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     signs = np.concatenate([[1.0], np.cumprod(flips)]) if len(turns) else np.ones(0)
     return turns * signs[:, None]

@@ -16,7 +16,8 @@ class Way:
     Attributes:
         strength: 1 sets the expression, 0 changes nothing; below 0 it is subtracted if `additive`
             is True.
-        others_to_rest: True: other sliders are blended to rest by `strength`.
+        others_to_rest: True: other sliders are blended to rest by `strength`. It has no effect on
+            an expression that names its regions, or if `additive` is True.
         flip: True: left and right of the expression are swapped.
         additive: True: the expression is added to the current pose; other sliders do not move.
         regions: only sliders of these regions move; empty for all regions.
@@ -72,7 +73,13 @@ def mixed(
 def _flipped(
     goals: Mapping[str, float], present: Collection[str], regions: FaceRegions
 ) -> dict[str, float]:
-    """Swap the weights of left and right sliders; a slider without a partner keeps its weight."""
+    """Swap the weights of left and right sliders; a slider without a partner keeps its weight.
+
+    Args:
+        goals: slider -> weight of the expression.
+        present: names of all sliders of the face; a partner outside of them does not count.
+        regions: regions of the face, which find the partners.
+    """
     found = {}
     for name, value in goals.items():
         other = regions.mirrored(name)

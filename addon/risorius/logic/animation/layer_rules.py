@@ -17,7 +17,7 @@ from ..character import slider_words
 Float = NDArray[np.float64]
 COLLECTION = "risorius_layers"
 _PATH = re.compile(rf"^{COLLECTION}\[(\d+)\]")
-_LIMIT = 100_000  # most samples of one source
+_LIMIT = 100_000  # largest number of samples of a source in addition to its keys
 _NEAR = 1e-7  # times that differ by fewer frames are merged
 
 
@@ -61,7 +61,7 @@ class Span:
         repeat: number of times that the source plays, such as 1.5.
         reverse: True: plays from `last` to `first`.
         warp: frames of the scene and the frames of the source that play at them, float64[n] each;
-            replaces all other settings. None: no warp.
+            replaces `start`, `scale`, `repeat` and `reverse`. None: no warp.
     """
 
     start: float
@@ -84,7 +84,11 @@ class Span:
         return self.start, self.start + self.period * self.repeat
 
     def source(self, frames: Float) -> Float:
-        """The source's frames that the layer shows at given frames of the scene."""
+        """The source's frames that the layer shows at given frames of the scene.
+
+        Before the start and after the end, the source repeats; a warp holds its first and last
+        frame.
+        """
         if self.warp is not None:
             return np.interp(frames, *self.warp)
         if not self.period > 0.0:
@@ -94,7 +98,7 @@ class Span:
 
 
 def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
-    """The source's frames to sample, so that straight lines between samples replace its curves.
+    """The frames to sample, so that straight lines between samples replace the source's curves.
 
     On whole frames of the scene, the lines equal the source. If a curve is not straight between
     keyframes, four samples per frame of the scene keep the error between whole frames small.

@@ -85,11 +85,15 @@ def word_of(sounds: Sequence[Sound], place: int) -> range | None:
 
 
 def changed(old: Sequence[Sound], new: Sequence[Sound], end: float) -> tuple[float, float] | None:
-    """The first and last frame at which two lists differ, or None if they are equal.
+    """The range of frames in which two lists have different sounds.
 
     Args:
-        old, new: lists of sounds.
+        old, new: lists of sounds; their words are not compared.
         end: frame at which both lists end.
+
+    Returns:
+        The first frame of the range, and the frame from which the lists are equal again. None if
+        the starts and names of all sounds are equal.
     """
     before = [(s.begin, s.name) for s in old]
     after = [(s.begin, s.name) for s in new]
@@ -136,7 +140,13 @@ def moved(
 
 
 def replaced(sounds: Sequence[Sound], place: int, name: str) -> list[Sound]:
-    """The list with the phoneme `name` for the sound at index `place` of `sounds`."""
+    """Replace the phoneme of one sound.
+
+    Args:
+        sounds: the list.
+        place: index of the sound.
+        name: the new phoneme; a sound that becomes silence (SIL) loses its word.
+    """
     out = list(sounds)
     word = "" if name == SILENCE else out[place].word
     out[place] = out[place]._replace(name=name, word=word)
@@ -144,16 +154,17 @@ def replaced(sounds: Sequence[Sound], place: int, name: str) -> list[Sound]:
 
 
 def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> list[Sound]:
-    """Insert a sound at a frame; it lasts until the end of the sound that it divides.
+    """Insert a sound at a frame; it lasts until the next sound of the list begins.
 
     Args:
         sounds: the list.
-        begin: frame at which the sound begins.
+        begin: frame at which the sound begins; moved if the sound or the one before it would last
+            less than SHORTEST.
         name: phoneme of the sound.
         end: frame at which the list ends.
 
     Raises:
-        SpokenError: the list has no room for it.
+        SpokenError: the sound at this frame is too short to be divided.
     """
     after = next((i for i, s in enumerate(sounds) if s.begin > begin), len(sounds))
     low = sounds[after - 1].begin + SHORTEST if after else -float("inf")
@@ -168,7 +179,9 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
 def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
     """Remove sounds. The sound before the removed ones is extended to fill their time.
 
-    If the first sounds of the list are removed, the sound after them begins earlier instead.
+    If the first sounds of the list are removed, the sound after them begins earlier instead. If the
+    first sound of a word is removed, the next sound gets the word, unless this sound is silence or
+    begins another word.
 
     Args:
         sounds: the list.
@@ -262,17 +275,18 @@ class Board:
     def paired(self, named: Callable[[str], str | None]) -> tuple[dict[int, Mark], list[Mark]]:
         """Find the current marker of each sound by frame and name, which is all that markers store.
 
-        An unchanged marker belongs to its sound. If the marker of a sound is gone, the sound gets
-        the first of these: a marker with another name at the sound's frame (renamed), a marker with
-        the sound's name at another frame (moved), or a marker between the neighbouring sounds that
-        is named like a mouth shape.
+        A marker with unchanged frame and name belongs to its sound. The other sounds are compared
+        with the markers that are not the user's own. A sound gets the first of these: a
+        marker with another name at the sound's frame (renamed), a marker with the sound's name at
+        another frame (moved), or a marker between the neighbouring sounds that is named like a
+        mouth shape. Of several such markers, the nearest counts.
 
         Args:
             named: converts a mouth shape's name to a phoneme; returns None for an unknown name.
 
         Returns:
-            Index in `placed` -> current marker, and a list of markers for added sounds. All other
-            markers belong to the user.
+            Index in `placed` -> current marker, and a list of markers for added sounds: the markers
+            left over whose name contains a mouth shape. All other markers belong to the user.
         """
         there, found = Counter(self.there), dict[int, Mark]()
         for place, mark in enumerate(self.placed):  # most are unchanged; there may be thousands
@@ -330,8 +344,9 @@ def from_marks(
         The new list; indices in `sounds` of moved sounds that were stopped by a neighbour.
 
     Raises:
-        SpokenError: no marker of the sounds is left, or a marker's name contains no mouth shape or
-            phoneme, or an added sound has no room.
+        SpokenError: no marker of the sounds is left, the markers were created for another number
+            of sounds, a renamed marker contains no mouth shape or phoneme, or an added sound has
+            no room.
     """
     found, more = board.paired(named)
     if not found or len(board.placed) != len(sounds):
@@ -358,6 +373,13 @@ def _renamed(
     named: Callable[[str], str | None],
 ) -> Sound:
     """The sound with the word and the mouth shape in a marker's name.
+
+    Args:
+        mark: the marker with its current name.
+        before: the marker as the add-on created it.
+        sound: the sound of the marker.
+        label: converts a phoneme to the name of its mouth shape.
+        named: converts the name of a mouth shape or phoneme to a phoneme; None if unknown.
 
     Raises:
         SpokenError: the name contains no known mouth shape or phoneme.

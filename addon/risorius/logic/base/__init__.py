@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names, errors and coordinate spaces that the other folders of `logic` share."""
+"""Names, errors, sentences, face regions, heat colours and coordinate spaces for all packages."""

@@ -17,7 +17,7 @@ def cut(name: str, limit: int = MAX_BYTES) -> str:
         limit: largest number of bytes.
 
     Returns:
-        The same text, or a shorter one that is valid UTF-8; never empty.
+        Valid UTF-8 without zero bytes; "unnamed" for an empty text.
     """
     clean = name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     clean = clean.replace("\0", "") or "unnamed"

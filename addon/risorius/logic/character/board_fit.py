@@ -19,8 +19,11 @@ from .board_table import BoardTable, Doubles
 
 _SWEEPS = 40  # most sweeps; controls that share outputs halve their error in each
 _ENOUGH = 1e-7  # a sweep that moves no control by more ends the fit
-_RIGHT = 1e-9  # raw controls closer than this to their goal count as reached
-_REST = 1e-10  # cost per unit of distance from rest: decides between equal values
+# Limit of differences and of sums of squared differences. A raw control counts as reached if it
+# differs from its goal by no more than _RIGHT. A pose is refitted if its sum of squared differences
+# exceeds _RIGHT, and a refit counts only if it lowers this sum by more than _RIGHT.
+_RIGHT = 1e-9
+_REST = 1e-10  # cost per unit of distance from rest: decides between equally good values
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class Loss:
     """The accuracy of a conversion: the raw controls that differ most.
 
     Attributes:
-        largest: largest difference of a converted raw control from its wanted value, at any frame.
+        largest: largest difference of a converted raw control from its wanted value, in any pose.
         worst: names of raw controls with their largest difference, the largest first; differences
             that are too small to see are left out.
     """
@@ -38,7 +41,7 @@ class Loss:
 
 
 def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
-    """Fit GUI controls to raw controls by least squares, within their ranges.
+    """Fit GUI controls, within their ranges, to raw controls by least squares.
 
     Args:
         table: GUI controls of the face.
@@ -62,7 +65,13 @@ def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
 
 
 def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
-    """Set each GUI control in turn to its best value until none moves. Args: gui  is changed."""
+    """Set each GUI control in turn to its best value, until none moves or after 40 sweeps.
+
+    Args:
+        table: GUI controls of the face.
+        wanted: float64[N, R], wanted raw controls of N poses.
+        gui: float64[N, G], GUI controls, which are changed in place.
+    """
     totals = table.sums(gui)
     movable = [g for g in range(len(table.names)) if table.outputs_of(g)]
     for _sweep in range(_SWEEPS):
@@ -71,7 +80,7 @@ def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
             outputs = table.outputs_of(index)
             given = np.clip(totals[:, outputs], 0.0, 1.0)
             if np.abs(given - wanted[:, outputs]).max(initial=0.0) <= _RIGHT:
-                continue  # outputs are reached: during a drag, most are
+                continue  # during a drag, most raw controls are reached already
             own = table.part(index, gui[:, index])
             others = totals[:, outputs] - own
             best = _best(table, index, wanted[:, outputs], others)
@@ -86,7 +95,13 @@ def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int
     """Refit two GUI controls that drive the same raw control, if that improves a pose.
 
     One of them can drive the raw control so far that the other has no effect. So both are set to 0
-    and fitted in both orders. Args: gui  is changed in the poses that improve.
+    and fitted in both orders.
+
+    Args:
+        table: GUI controls of the face.
+        wanted: float64[N, R], wanted raw controls of N poses.
+        gui: float64[N, G], GUI controls, which are changed in the poses that improve.
+        pair: indices of the two GUI controls.
     """
     left = _cost(table, wanted, gui)
     for order in (pair, pair[::-1]):
@@ -108,7 +123,14 @@ def _cost(table: BoardTable, wanted: Doubles, gui: Doubles) -> Doubles:
 
 
 def _best(table: BoardTable, index: int, wanted: Doubles, others: Doubles) -> Doubles:
-    """float64[N]: the best value of one GUI control if all other GUI controls stay unchanged."""
+    """float64[N]: the best value of one GUI control if all other GUI controls stay unchanged.
+
+    Args:
+        table: GUI controls of the face.
+        index: index of the GUI control.
+        wanted: float64[N, n], wanted values of the n raw controls that this GUI control drives.
+        others: float64[N, n], contributions of all other GUI controls to these raw controls.
+    """
     breaks = table.breaks_of(index)
     tried = [np.full(len(wanted), end) for end in breaks]
     for low, high in pairwise(breaks):

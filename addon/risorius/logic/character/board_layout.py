@@ -24,10 +24,10 @@ RIGHT, LEFT, UP, DOWN = (1, 0), (-1, 0), (0, 1), (0, -1)
 Direction = tuple[int, int]
 
 _TEXT, _TITLE = 0.29, 0.46  # heights of letters in labels and titles, in board units
-_TRACK = 0.34  # width of a slider's frame
-_GAP = 0.3  # between sliders
+_TRACK = 0.34  # width of the frame of a handle that moves along one axis
+_GAP = 0.3  # between neighbouring frames, and between cells (frames with a common label)
 _MARGIN = 0.6  # around the board
-_LONGEST = 10  # letters in one line of a label
+_LONGEST = 10  # most letters in a line of several words of a label
 _WIDEST, _LINES = 14, 4  # longest word in letters, and most lines of a label
 _NARROWEST = 31.0  # smallest width of the board
 
@@ -89,11 +89,11 @@ class Handle:
 
 @dataclass(frozen=True)
 class Board:
-    """A complete face board, centred at 0, 0.
+    """A face board of either kind (complete or primary), centred at 0, 0.
 
     Attributes:
         handles: its handles.
-        lines: frames and labels of the handles.
+        lines: frames and labels of the handles, and titles and outlines around them.
         border: outline of the board, for selecting the board.
         width, height: size of the outline.
     """
@@ -173,7 +173,8 @@ _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
         ),
     ),
 )
-# Name of a handle -> label; for names that are too long, or unclear without their region.
+# Stem of a handle in lower case -> label; for stems that are too long, or unclear without their
+# region.
 _LABELS = {
     "eyelashes_tweakerin": "Lashes In", "eyelashes_tweakerout": "Lashes Out", "eye": "Look",
     "eye_eyelidu": "Upper Lid", "eye_eyelidd": "Lower Lid", "ear_up": "Ear Up",
@@ -191,7 +192,7 @@ _PREFIX = re.compile(r"^CTRL_(?:([LRC])_)?")
 _LAST_SIDE = re.compile(r"[LR](?=$|Ph\d$)")
 _BESIDE = re.compile(r"(Left|Right)(?=[A-Z_]|$)")
 _DOWNWARDS = re.compile(r"(Down|Depress|Open|Blink)(?=[A-Z_]|$)")
-_CLEAR = 0.05  # smallest measured sideways motion that decides a direction
+_CLEAR = 0.05  # smallest sideways share of the measured motion that decides a direction
 _LIP = re.compile(r"[UD]$")
 
 
@@ -232,7 +233,9 @@ def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
 def is_middle(table: BoardTable, gui: int) -> bool:
     """Whether a GUI control belongs to no side.
 
-    Args: table  all GUI controls; gui  index of the GUI control.
+    Args:
+        table: all GUI controls.
+        gui: index of the GUI control.
     """
     return not _side_of(_bone_of(table.names[gui])[0])
 
@@ -381,7 +384,9 @@ def _label(stem: str, region: str) -> list[str]:
 def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
     """Place handles in centred rows with a label below.
 
-    Args: rows  from the top down, left to right.
+    Args:
+        rows: rows of handles, from the top down; each row from left to right.
+        label: the lines of the label.
     """
     boxes = [[frame_of(h) for h in row] for row in rows]
     widths = [sum(f[2] - f[0] for f in row) + _GAP * (len(row) - 1) for row in boxes]
@@ -400,10 +405,7 @@ def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
 
 
 def frame_of(handle: Handle) -> tuple[float, float, float, float]:
-    """Left, bottom, right and top of a handle's frame, relative to its rest place.
-
-    Args: handle the handle.
-    """
+    """Left, bottom, right and top of a handle's frame, relative to its rest place."""
     left, bottom, right, top = handle.box()
     half = _TRACK / 2
     return left - half, bottom - half, right + half, top + half
@@ -412,7 +414,14 @@ def frame_of(handle: Handle) -> tuple[float, float, float, float]:
 def _face_block(
     title: str, sides: _Columns, middle: _Columns, left: Sequence[Handle]
 ) -> _Block | None:
-    """A block of the handles with known names, or None if the face has none of them."""
+    """A block of the handles with known names, or None if the face has none of them.
+
+    Args:
+        title: title of the block.
+        sides: columns of stems on each side of the face, from the outer edge inwards, as in _FACE.
+        middle: columns of stems in the middle.
+        left: the handles that are not placed yet.
+    """
     by_name = {(h.side, h.stem.lower()): h for h in left}
 
     def columns(side: str, wanted: _Columns) -> list[list[_Cell]]:
@@ -442,7 +451,13 @@ def _face_block(
 
 
 def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block | None:
-    """A block of the remaining handles of a region in rows, or None if there are none."""
+    """A block of the remaining handles of a region in rows, or None if there are none.
+
+    Args:
+        title: title of the block.
+        handles: the handles of the region.
+        width: width of the board between its margins, in board units.
+    """
     if not handles:
         return None
     block = _Block(title)
@@ -460,7 +475,7 @@ def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block
 
 
 def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
-    """Distribute cells evenly over the fewest rows that fit into a width."""
+    """Distribute cells evenly over as few rows as fit into a width."""
     total = sum(cell.width + _GAP for cell in cells)
     share = total / max(1.0, np.ceil(total / width))
     rows: list[list[_Cell]] = [[]]
@@ -477,7 +492,8 @@ def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
 def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
     """Make a cell for each stem of handles; tall cells are last.
 
-    Short handles of the upper and the lower lip with otherwise equal stems share a cell.
+    Short handles on a side of the face whose stems differ only in a final U or D, for the upper and
+    the lower lip, share a cell.
     """
     groups: dict[str, list[Handle]] = {}
     stems = {h.stem for h in handles}

@@ -227,9 +227,15 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
 
 def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
-    """Three names: the raw controls driven above and below 0 by a GUI control, the GUI control.
+    """Choose the GUI control of a raw control, and the opposite that shares the GUI control.
 
-    The second name is "" if no raw control is driven below 0.
+    Args:
+        name: name of a raw control without prefix.
+        index: name of each raw control of the face, without prefix -> its index.
+
+    Returns:
+        The raw control that the GUI control drives above 0, the raw control that it drives below 0
+        ("" for none), and the GUI control.
     """
     for pair in _OPPOSITES:
         for one, other in (pair, pair[::-1]):

@@ -51,7 +51,7 @@ class ArmaturePlan:
         parents: index of each joint's parent, -1 for a root.
         rest: float64[J, 4, 4], world matrices at rest, in Blender units; the columns are the bone's
             axes.
-        lengths: float64[J] display length of each bone.
+        lengths: float64[J], display length of each bone in Blender units.
         order: joint indices, with parents before their children.
     """
 
@@ -111,7 +111,12 @@ class ControlPlan:
 
 @dataclass(frozen=True)
 class Anchors:
-    """Indices of the joints that bones of the control armature rotate; empty or None if missing."""
+    """Indices of the joints that bones of the control armature rotate; empty or None if missing.
+
+    Attributes:
+        neck: one or two joints, from the bottom up.
+        eyes: side "L" or "R" -> joint.
+    """
 
     neck: tuple[int, ...]
     head: int | None
@@ -120,7 +125,16 @@ class Anchors:
 
 @dataclass(frozen=True)
 class CharacterPlan:
-    """All data that the add-on builds for one file."""
+    """All data that the add-on builds for one file.
+
+    Attributes:
+        map_labels: names of the animated maps, by index.
+        channel_count: number of blend shape channels.
+        lod_count: number of LODs of the file, also those that are not built.
+        textures: (mesh base, role) -> file name, as in the file's metadata.
+        origin: the file's metadata without the names of textures.
+        size: largest extent of the planned meshes along an axis, in Blender units.
+    """
 
     name: str
     space: Space
@@ -170,7 +184,10 @@ def space_of(dna: DnaData, unit_scale: float) -> Space:
 
 
 def find_anchors(joint_names: Sequence[str]) -> Anchors:
-    """Find the neck, head and eye joints by their usual names, in upper or lower case."""
+    """Find the neck, head and eye joints by their usual names, such as neck_01 or FACIAL_L_Eye.
+
+    Upper and lower case are equal, and so are dots and underscores.
+    """
     where: dict[str, int] = {}
     for index, name in enumerate(joint_names):
         where.setdefault(name.lower().replace(".", "_"), index)
@@ -410,9 +427,14 @@ def _plan_mesh(
 def _faces(
     mesh: MeshData, layouts: NDArray[np.int64], flip: bool
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """First corner of each face, and layout of each corner.
+    """First corner of each face, int32[F], and layout of each corner, int64[N].
 
     Faces with fewer than 3 corners or a repeated vertex are left out.
+
+    Args:
+        mesh: the mesh in the DNA file.
+        layouts: int64[L], vertex of each layout.
+        flip: True: reverse the order of the corners of each face.
     """
     bounds = np.asarray(mesh.face_offsets, np.int64)
     flat = np.asarray(mesh.face_layouts, np.int64)
@@ -432,7 +454,16 @@ def _faces(
 def _corner_values(
     values: NDArray[np.float32], layout: NDArray[np.uint32], corners: NDArray[np.int64]
 ) -> NDArray[np.float32] | None:
-    """Values of the face corners; None if the file has no values or a bad index."""
+    """Values of the face corners, float32[N, n]; numbers that are not finite become 0.
+
+    Args:
+        values: float32[values, n], UV coordinates or normals.
+        layout: index of the value of each layout.
+        corners: layout of each of the N corners.
+
+    Returns:
+        None if there are no values or no corners, or if an index is too large.
+    """
     if not len(values) or not len(corners) or int(corners.max()) >= len(layout):
         return None
     indices = np.asarray(layout, np.int64)[corners]

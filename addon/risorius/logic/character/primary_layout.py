@@ -74,7 +74,13 @@ def _words(text: str, side: str) -> str:
 
 
 def _label(handle: Handle, rows: Sequence[str], at: Direction) -> Iterator[Line]:
-    """The letters of a handle's label beside, above or below its frame."""
+    """The letters of a handle's label beside, above or below its frame.
+
+    Args:
+        handle: the handle.
+        rows: the lines of the label, from the top down.
+        at: side of the frame on which the label is placed: UP, DOWN, LEFT or RIGHT.
+    """
     left, bottom, right, top = board_layout.frame_of(handle)
     left, bottom = min(left, _GAP - _DISC), min(bottom, _GAP - _DISC)
     right, top = max(right, _DISC - _GAP), max(top, _DISC - _GAP)

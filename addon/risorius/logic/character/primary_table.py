@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The primary board: about 30 handles arranged like a face, each for several controls.
+"""The primary board: about 30 handles arranged like a face, most for several controls.
 
 A handle's location along each of its axes is a value from -1 to 1, and each half of an axis drives
 raw controls with weights. The result is a table of GUI controls like a file's, made from names of
@@ -19,7 +19,7 @@ from .board_letters import Point
 from .board_table import BoardTable, Row
 
 Led = Mapping[str, float]  # raw control without prefix and side -> weight
-_CLEAR = 0.05  # smallest measured sideways motion that decides a direction
+_CLEAR = 0.05  # smallest sideways share of the measured motion that decides a direction
 
 
 @dataclass(frozen=True)
@@ -118,10 +118,14 @@ class _Way:
 
 
 def bone_of(part: Part, side: str) -> str:
-    """The name of a handle's bone. Args: part the handle; side "L" or "R", "" for none.
+    """The name of a handle's bone.
 
     The side is in the middle of the name, where Blender does not recognise it. Otherwise Blender
     would mirror handles about the armature's centre instead of the board's centre.
+
+    Args:
+        part: the handle, or the pair of handles to which it belongs.
+        side: "L" or "R"; "" for none.
     """
     return f"face_{side}_{part.stem}" if side else f"face_{part.stem}"
 
@@ -156,7 +160,13 @@ def _ways_of(part: Part, side: str, index: Mapping[str, int]) -> Iterator[_Way]:
 
 
 def _raws(led: Led, side: str, index: Mapping[str, int]) -> dict[int, float]:
-    """Index of each raw control that half an axis drives -> weight."""
+    """Index of each raw control that half an axis drives -> weight.
+
+    Args:
+        led: raw controls of the half axis, without prefix and side -> weight.
+        side: side of the handle, "L" or "R"; "" drives both sides of each raw control.
+        index: name of a raw control without prefix -> its index in the face.
+    """
     out: dict[int, float] = {}
     for stem, share in led.items():
         wanted = (stem + side,) if side else (stem, f"{stem}L", f"{stem}R")

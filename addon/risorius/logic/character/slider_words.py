@@ -10,7 +10,7 @@ from ..base.face_regions import FaceRegions
 
 _OTHER = {"Left": "Right", "Right": "Left"}
 _SIDE = re.compile(r"[LR](?=$|Ph\d$)")
-# Abbreviation at the end of a control's name -> word in the title of its slider.
+# Abbreviation in a control's name -> word in the title of its slider.
 _WORDS = {
     **{"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "},
     **{"Ph": "Phase ", "Fwd": "Forward"},

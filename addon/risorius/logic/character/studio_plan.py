@@ -2,8 +2,8 @@
 """Places camera, lights and backdrop of a portrait around a head.
 
 All places are in the head's axes: the face looks along -y, z is up, and the origin is the midpoint
-between the eyes. Lengths in this file are metres for an adult head; they are scaled by the distance
-between the eyes.
+between the eyes. The constants are metres for an adult head; results are Blender units, scaled by
+the distance between the eyes.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from dataclasses import dataclass
 Triple = tuple[float, float, float]
 
 GROWN = 0.063  # metres between the eyes of the adult head
-LENS = 100.0  # mm: a portrait lens on SENSOR
+LENS = 100.0  # mm: focal length, as of a portrait lens
 SENSOR = 24.0  # mm: height of a full frame sensor
-_HEIGHT = 0.39  # metres: height of the picture at the eyes, head and shoulders
+_HEIGHT = 0.39  # metres: height of a picture of head and shoulders, in the plane of the eyes
 _HEADROOM = 0.014  # metres above the hair, at least
-_EDGE = 0.02  # metres from the lower edge of the picture to the lower end of the mesh
+_EDGE = 0.02  # metres from the lower edge of the picture to the lower end of the mesh, at least
 _CHIN = 0.13  # metres below the eyes that every picture contains
 _NECK = 0.185  # metres below the eyes: a mesh that ends above has no neck
 _THIRD = 1.0 / 3.0  # distance of the eyes from the upper edge, as a share of the picture
 _ASIDE = 8.0  # degrees: turns the camera to the side of the fill light
 _ABOVE = 0.045  # metres: height of the camera above the eyes
 _DEPTH = 0.075  # metres from the eyes back to the middle of the head
-_WALL = 1.7  # metres from the middle of the head to the backdrop
+_WALL = 1.7  # metres from the middle of the head to the backdrop, at least
 _WALL_SIZE = (6.0, 4.0)
 
 
@@ -126,6 +126,10 @@ def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
     The eyes are a third of the picture's height below its top, unless hair needs more room. The
     picture of a face with a neck ends above the lower end of its mesh; a face without a neck is
     shown completely.
+
+    Args:
+        unit: Blender units per metre of the adult head.
+        low, high: z of the lowest and of the highest vertex minus z of the eyes, in Blender units.
     """
     below = min(_HEIGHT * (1.0 - _THIRD) * unit, max(-low - _EDGE * unit, _CHIN * unit))
     if -low <= _NECK * unit:

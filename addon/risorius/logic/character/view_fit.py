@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 Box = tuple[float, float, float, float]  # left, bottom, right, top
 
-_HALF = 36.0  # mm, half the sensor width of the viewport's camera: twice that of a render's camera
+_HALF = 36.0  # mm, half the sensor width (72 mm) of the viewport; a render camera has 36 mm
 _MARGIN = 1.25
 _FILLED = 0.98  # share of the free part of a region that the points fill
 _HALVINGS, _SHIFTS = 30, 3
-_NEAR_ENOUGH = 1.8  # times too near or too far: a view within this factor does not move
+_NEAR_ENOUGH = 1.8  # a view whose distance is wrong by a smaller factor does not move
 
 
 def distance(radius: float, lens: float, size: Sequence[float], perspective: bool) -> float:
-    """The distance from the centre of a ball at which a view shows the whole ball.
+    """The distance from the centre of a ball at which a view shows the ball with a margin of 25 %.
 
     Args:
         radius: radius of the ball, in Blender units.
@@ -28,7 +28,8 @@ def distance(radius: float, lens: float, size: Sequence[float], perspective: boo
         perspective: True: perspective view; False: orthographic view.
     """
     longer, shorter = max(*size, 1.0), max(min(size), 1.0)
-    slope = _HALF / lens * shorter / longer  # half of what the shorter side shows
+    # Half of the extent that the shorter side shows, per unit of distance.
+    slope = _HALF / lens * shorter / longer
     share = math.sin(math.atan(slope)) if perspective else slope
     return _MARGIN * radius / max(share, 1e-6)
 

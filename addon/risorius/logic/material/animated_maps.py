@@ -48,7 +48,7 @@ class MapUse:
         index: index of the map in the DNA file.
         label: name of the map.
         color, normal: whether the map changes the colour and the normals.
-        number: 1 to 3 for a wrinkle set, 0 for none.
+        number: number of the wrinkle set in the name, usually 1 to 3; 0 for none.
         region: name of its mask such as `head_wm1_blink_l`, lower case; "" if the map's name has
             none.
         area: one of AREAS, or "all".
@@ -67,6 +67,8 @@ class MapUse:
 
 def use_of(index: int, label: str) -> MapUse:
     """The effect of a map: `head_cm1_color.head_wm1_blink_L` tints the left eye's area with set 1.
+
+    A map whose name says neither "colour" nor "normals" changes both.
 
     Args:
         index: index of the map in the DNA file.

@@ -28,7 +28,7 @@ _SPOTS: dict[str, tuple[tuple[float, float, float, float], ...]] = {
 }
 _EYES_APART = 6.2  # centimetres between the eyes
 _AT_ONCE = 2048  # points per step, which limits memory
-_NEVER_BEHIND = {"neck"}  # areas that continue behind the eyes
+_NEVER_BEHIND = {"neck"}  # areas that reach farther back behind the eyes than the others
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,12 @@ class FaceFrame:
 def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> FaceFrame:
     """Find the FaceFrame of a head.
 
+    Unknown eyes or an unknown mouth, and places that do not fit the size of the head, are replaced
+    by the proportions of a usual head.
+
     Args:
         eyes: float64[3] each, centres of one eye or both; empty if unknown.
-        head: float[V, 3] vertices of the head.
+        head: float[V, 3] vertices of the head, in Blender units.
         mouth: float[3], a point inside the mouth, or None.
     """
     low, high = head.min(axis=0).astype(float), head.max(axis=0).astype(float)
@@ -76,8 +79,8 @@ def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> Fac
 def face_coordinates(points: Points, frame: FaceFrame) -> NDArray[np.float64]:
     """float64[V, 3]: x, depth and height of points relative to the midpoint between the eyes.
 
-    The unit is the distance between the eyes. Below the eyes, the unit of the height is the
-    distance from the eyes down to the mouth.
+    The depth grows towards the back of the head. The unit is the distance between the eyes. Below
+    the eyes, the unit of the height is the distance from the eyes down to the mouth.
 
     Args:
         points: float[V, 3], in Blender units.

@@ -93,7 +93,7 @@ PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Mask:
-    """A region's mask: an image file, and the colour channel, 0 (red) to 3 (alpha)."""
+    """The mask of a wrinkle region: path of the image, and colour channel, 0 (red) to 3 (alpha)."""
 
     path: Path
     channel: int
@@ -108,7 +108,8 @@ class TexturePlan:
             `color:1` to `color:3` and `normal:1` to `normal:3` for the wrinkle sets, `map:<animated
             map>` for a mask named in the DNA file's metadata.
         masks: region such as `head_wm1_blink_l`, in lower case -> Mask.
-        missing: one sentence for each texture that the DNA file names but that was not found.
+        missing: one sentence for each texture that the DNA file names for a mesh of the face but
+            that was not found.
     """
 
     files: dict[tuple[str, str], Path] = field(default_factory=dict)
@@ -158,8 +159,9 @@ def read_name(stem: str) -> tuple[str, str, str] | None:
         stem: the file's name without its ending.
 
     Returns:
-        Part (head, body, eyes, teeth, tongue, lashes), side (left, right or empty) and role; None
-        if the name does not follow these rules.
+        Part (head, body, eyes, teeth, tongue, lashes), side (left, right or empty) and role, as in
+        TexturePlan. None if the part or the role is missing, if an unknown word follows the part,
+        or if a wrinkle set has another role than color or normal.
     """
     part = role = number = side = ""
     for word in split_words(stem):
@@ -200,11 +202,11 @@ def read_mask(stem: str) -> dict[str, int]:
 
 
 def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
-    """The part and side of a mesh, named as in the result of `read_name`.
+    """The part and side of a mesh, named as in the result of `read_name`; part "" if it has none.
 
     Args:
         base: mesh name without its LOD.
-        kind: kind of the mesh, see MeshPlan.
+        kind: kind of the mesh, such as skin or eyes.
         skins: base names of all skin meshes.
     """
     word = base.lower()

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 Float32 = NDArray[np.float32]
 Totals = NDArray[np.int32] | NDArray[np.int64]
 
-_FULL = 0.5  # share of the square: a layout whose bounds cover more stays
-_RIM = 0.08  # of a cell, empty on each side, so that no face shows its neighbour's colour
+_FULL = 0.5  # a layout whose bounds cover at least this share of the square stays unchanged
+_RIM = 0.08  # share of a cell's size, empty on each side, so that no neighbour's colour shows
 
 
 def spread(points: Float32) -> Float32 | None:
     """Stretch a UV layout over the unit square, unless it already fits.
 
-    A layout fits if it is inside the square and its bounding rectangle covers half of the square.
+    A layout fits if it is inside the square and its bounding rectangle covers at least half of the
+    square.
 
     Args:
         points: float[N, 2], UV coordinates of all face corners of one texture.
@@ -35,7 +36,8 @@ def spread(points: Float32) -> Float32 | None:
 def overlaps(points: Float32, totals: Totals) -> bool:
     """Whether faces must overlap in UV space.
 
-    They must if the sum of their areas is more than 1.02 times their bounding rectangle's area.
+    They must if the sum of the faces' areas is more than 1.02 times the area of the rectangle
+    around all of them.
 
     Args:
         points: float[N, 2], UV coordinates of the corners, face by face.

@@ -19,11 +19,13 @@ from ...logic.animation import track_matching
 from ..base import compat, saved
 from ..base.blender_types import Animated
 
-BEFORE = "risorius_before"  # on a datablock with a baked action: its earlier animation
-BAKED_ACTION = "risorius_baked_action"  # marks a baked action, which `restore` removes
-_DIGEST = "risorius_digest"  # on a baked action: digest of its keys after the bake
+BEFORE = "risorius_before"  # on a datablock with a baked action: its animation before the bake
+# Custom property that marks a baked action. `restore` removes such an action if nothing else uses
+# it and the user did not edit its keys (see `was_edited`).
+BAKED_ACTION = "risorius_baked_action"
+_DIGEST = "risorius_digest"  # on a baked action: result of `_digest` after the bake
 _LINEAR = 1  # number of Blender's interpolation "LINEAR"
-_AT_ONCE = 1 << 21  # values (frames times columns) that are reduced in one call
+_AT_ONCE = 1 << 21  # approximate number of values (frames times columns) reduced in one call
 
 
 @dataclass
@@ -34,8 +36,8 @@ class Track:
         path: data path of the property.
         group: name of the group of its F-curves.
         values: float32[frames, width], the components of the property at each frame.
-        now: float[width], current value of the property in the scene. A property that has this
-            value at all frames needs no curve. None: always make a curve.
+        now: float[width], current value of the property in the scene. `write` makes no curve of a
+            property that has this value at all frames. None: always make a curve.
         first: array index that the first column of values animates.
         indexed: whether the property is an array.
     """
@@ -81,7 +83,8 @@ def write(
         owner: the datablock that will play it.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        error: largest difference of a value after the key reduction, in the units of the values;
+            0: keep every key of a curve that moves.
         counts: totals, which this call increases.
 
     Returns:
@@ -110,7 +113,8 @@ def add_tracks(
         bag: receives the F-curves; must not contain curves of these properties.
         frames: float64[N], frames of the scene.
         tracks: values of the properties at these frames.
-        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        error: largest difference of a value after the key reduction, in the units of the values;
+            0: keep every key of a curve that moves.
         counts: totals, which this call increases.
     """
     times = np.asarray(frames, np.float32)
@@ -128,8 +132,16 @@ def _reduced(
     frames: NDArray[np.float64], tracks: Sequence[Track], error: float, counts: Counts
 ) -> Iterator[tuple[Track, NDArray[np.float32], NDArray[np.bool_]]]:
     """Yields each track, its values [frames, width], and a mask of the keys that remain after the
-    reduction, bool[frames, width]."""
-    most = max(_AT_ONCE // len(frames), 16)  # columns
+    reduction, bool[frames, width].
+
+    Args:
+        frames: float64[N], frames of the scene.
+        tracks: values of the properties at these frames.
+        error: largest error of the key reduction, in the units of the values; 0: keep every key
+            of a curve that moves. A curve that stays at its first value keeps only one key.
+        counts: totals, which this call increases.
+    """
+    most = max(_AT_ONCE // len(frames), 16)  # columns to collect before a reduction
     waiting, width = [], 0
     for number, track in enumerate(tracks):
         waiting.append(track)
@@ -152,7 +164,7 @@ def _reduced(
 def _new_curve(bag: bpy.types.ActionChannelbag, track: Track, index: int) -> bpy.types.FCurve:
     rna: Any = bag.fcurves.bl_rna
     words = rna.functions["new"].parameters.keys()
-    for word in ("action_group", "group_name"):  # argument in Blender up to 4.3; since 5.0
+    for word in ("action_group", "group_name"):  # name of the argument up to Blender 4.3; since 5.0
         if word in words:
             return bag.fcurves.new(track.path, index=index, **{word: track.group})
     curve = bag.fcurves.new(track.path, index=index)
@@ -173,20 +185,21 @@ def _fill(curve: bpy.types.FCurve, times: NDArray[np.float32], values: NDArray[n
 
 
 def was_edited(action: bpy.types.Action) -> bool:
-    """Whether the keys of an action changed since the last call of `stamp`.
+    """Whether the frames or values of an action's keys changed since the last call of `stamp`.
 
-    True if `stamp` was never called for the action.
+    Edits of handles and interpolation are not noticed. True if `stamp` was never called for the
+    action.
     """
     return action.get(_DIGEST) != _digest(action)
 
 
 def stamp(action: bpy.types.Action) -> None:
-    """Store a digest of the keys of an action, to notice later edits."""
+    """Store a digest of the frames and values of an action's keys for `was_edited`."""
     action[_DIGEST] = _digest(action)
 
 
 def _digest(action: bpy.types.Action) -> str:
-    """A digest of an action's keys; it differs after an edit."""
+    """A digest of data path, index, and frames and values of the keys of an action's F-curves."""
     found = hashlib.sha1(usedforsecurity=False)
     for curve in compat.curves_of(action):
         places = np.empty(len(curve.keyframe_points) * 2, np.float32)
@@ -203,7 +216,7 @@ def play(
     muted: Collection[str] = (),
     strip: bool = False,
 ) -> None:
-    """Let a datablock play a baked action and no other animation.
+    """Let a datablock play a baked action and no other action or NLA strip.
 
     The earlier animation of the datablock is stored for `restore`.
 
@@ -211,7 +224,7 @@ def play(
         owner: object or shape keys that play the action.
         action, slot: the results of `write`.
         muted: data paths of baked properties, whose drivers are muted.
-        strip: put the action on a new NLA track instead of making it the active one.
+        strip: put the action on a new NLA track instead of making it the active action.
     """
     keep(owner)
     data = owner.animation_data
@@ -293,7 +306,13 @@ def _set_back(owner: Animated, lines: Iterable[str]) -> None:
 
 
 def _set(owner: Animated, path: str, number: float) -> None:
-    """Set a property by its path: a custom property in brackets, or an attribute."""
+    """Set a property by its path: a custom property in brackets, or an attribute.
+
+    Args:
+        owner: the datablock from which the path starts.
+        path: data path of one number.
+        number: the new value.
+    """
     if path.endswith('"]'):
         where, key = path[:-2].rsplit('["', 1)
         item = owner.path_resolve(where) if where else owner
@@ -306,8 +325,9 @@ def _set(owner: Animated, path: str, number: float) -> None:
 def restore(owner: Animated) -> None:
     """Restore the animation that a datablock had before `play`.
 
-    Baked actions are removed, unless another datablock uses them, the user gave them a fake user,
-    or the user edited them. An action that the user assigned since `play` stays in the file.
+    Muted drivers play again, and the values that `note_values` stored are set. Baked actions are
+    removed, unless another datablock uses them, the user gave them a fake user, or the user edited
+    them. An action that the user assigned since `play` is unassigned and gets a fake user.
     """
     if BEFORE not in owner:
         return
@@ -380,9 +400,9 @@ def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
 
 
 def note_tracks_by_name(owner: Animated) -> bool:
-    """Convert stored states of NLA tracks from the format of old .blend files to texts of `_noted`.
+    """Convert the stored states of NLA tracks from the format of old .blend files to JSON texts.
 
-    The old format stores no track names, only the states in the order of the tracks.
+    The old format stores mute and solo in the order of the tracks; the texts have names too.
 
     Returns:
         Whether the stored states had the old format and were converted.
@@ -408,9 +428,14 @@ def note_tracks_by_name(owner: Animated) -> bool:
 def _remove_track(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[bpy.types.Action | None]:
-    """Remove the baked strips and restore mute and solo of the other tracks.
+    """Remove the baked strips, and tracks that are empty then; restore mute and solo of the others.
 
-    Returns: the actions of the removed strips.
+    Args:
+        data: the animation data with the NLA tracks.
+        state: the state that `keep` and `play` stored.
+
+    Returns:
+        The actions of the removed strips.
     """
     own = _baked_strips(data, state)
     played: list[bpy.types.Action | None] = []
@@ -437,7 +462,8 @@ def _baked_strips(
 ) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
     """The NLA strips that play the baked action, each with its track.
 
-    Strips and tracks that the user renamed or moved are found too.
+    Strips and tracks that the user renamed or moved are found too. If no strip plays the stored
+    action, strips of other baked actions on the track with the stored name are found.
     """
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
     baked = state.get("baked")

@@ -36,7 +36,9 @@ class Converted:
         loss: largest change of a raw control by the conversion, over the pose and all frames.
         kept: the unconverted action, kept with a fake user; None if no action was converted.
         curves: number of new F-curves.
-        idle: names of other actions of the face whose keys have no effect after the switch.
+        idle: names of played actions that have keys of the controls that no longer lead (sliders or
+            handles); these keys have no effect. With unconverted keys, the active action is among
+            them.
     """
 
     loss: board_fit.Loss = field(default_factory=board_fit.Loss)
@@ -109,8 +111,8 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
         kind: kind of the new board, runtime.PRIMARY or runtime.COMPLETE.
 
     Returns:
-        The result of the conversion to the new board. If the sliders lead, nothing is converted
-        and all attributes have their defaults.
+        The result of the conversion to the new board; `kept` is the action with keys of the old
+        board. If the sliders lead, nothing is converted and all attributes have their defaults.
     """
     controls, done = parts.controls_there(rig), Converted()
     led = board.leads_face(rig)
@@ -123,7 +125,7 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
         board_bones.show(controls, False)
         return done
     before, done = done, switch(rig, by_board=True, with_keys=True)
-    if done.kept is not None and before.kept is not None:  # the action with slider keys
+    if done.kept is not None and before.kept is not None:  # done.kept has slider keys
         bpy.data.actions.remove(done.kept)
         done.kept = before.kept
     return done
@@ -134,10 +136,10 @@ def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]
 
     Args:
         rig: the character that will play the action.
-        action: an action that no other datablock plays.
+        action: a new action, which is changed in place; no datablock plays it yet.
 
     Returns:
-        Sentences for a report.
+        Sentences for a report; empty if the sliders lead.
     """
     if not board.leads_face(rig):
         return []
@@ -163,7 +165,7 @@ def animates_sliders(rig: ArmatureObject) -> bool:
 def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
     """Convert the current pose to the board or to the sliders.
 
-    Returns: the changes of raw controls by the conversion.
+    Returns: the changes of raw controls by the conversion; no changes if it was to the sliders.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
@@ -205,7 +207,7 @@ def convert(
 
     Returns:
         The largest changes of raw controls at whole frames and at keys, and the number of new
-        curves.
+        curves. From handles to sliders, only the key reduction changes raw controls.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     curves = list(_leading_curves(action, controls, live, not by_board))

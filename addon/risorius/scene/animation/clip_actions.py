@@ -37,8 +37,8 @@ class Report:
     Attributes:
         action: the new action.
         first, last: first and last frame of the action.
-        curves: number of controls and bones that the action moves.
-        unknown: names of the clip's curves that match no control of this face.
+        curves: number of sliders and bones that the clip moves, with bones that the face lacks.
+        unknown: names of the clip's curves that match no control or bone of this face.
         notes: sentences for the user.
     """
 
@@ -113,7 +113,8 @@ def make_action(
         The action and notes for the user.
 
     Raises:
-        clip_units.ClipError: no curve fits this face, or a frame is outside Blender's range.
+        clip_units.ClipError: the clip has no frames, no curve fits this face, or a frame is outside
+            Blender's range.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     times = clip.frame_times()
@@ -228,7 +229,14 @@ def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
 def _set_from(
     points: bpy.types.FCurveKeyframePoints, name: str, first: int, new: NDArray[Any]
 ) -> None:
-    """Set the keyframe property `name` of all keyframes from index `first` to the end."""
+    """Set the keyframe property `name` of all keyframes from index `first` to the end.
+
+    Args:
+        points: the keyframes of an F-curve.
+        name: name of a property of a keyframe.
+        first: index of the first changed keyframe.
+        new: values of the property, flat.
+    """
     if first:
         width = len(new) // (len(points) - first)
         whole = np.empty(len(points) * width, new.dtype)
@@ -293,7 +301,7 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
         action: any action; of an action with slots, the slot for the control armature is played.
 
     Returns:
-        The earlier action, which gets a fake user; None if there was none.
+        The earlier action, which gets a fake user; None if there was none, or if it was `action`.
     """
     controls = parts.controls_there(rig)
     data = controls.animation_data_create()
@@ -306,7 +314,9 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
 
 
 def add_strip(rig: ArmatureObject, action: bpy.types.Action, name: str = "") -> bpy.types.NlaStrip:
-    """Add an action as a strip of a new NLA track, at the frames of its keys.
+    """Add an action as a strip of a new NLA track, at the frames of the action.
+    The frames are the manual frame range of the action, or else the range from its first to its
+    last key; the strip is at least one frame long, and holds its last frame.
 
     Args:
         rig: deforming armature of the character.
@@ -346,8 +356,8 @@ def clip_of_action(
         rate: frames per second of the scene; frame 0 is second 0 of the clip.
 
     Returns:
-        A clip with curves of the animated sliders by their property names (see dna_names), and of
-        animated control bones and gaze target by the names of `clip_units.BONES`.
+        A clip with curves of the animated sliders by their property names, and of
+        animated control bones and gaze target by the names in `clip_units.BONES`.
     """
     frames = np.asarray(frames, np.float64)
     curves = {(c.data_path, c.array_index): c for c in playing_curves(action, controls)}
@@ -379,7 +389,8 @@ def clip_of_action(
 def dna_names(live: runtime.Runtime, names: Iterable[str]) -> list[str]:
     """Replace Blender's shortened slider names by DNA names, which other characters know too.
 
-    A slider keeps Blender's name if its DNA name occurs twice. Names that belong to no slider stay.
+    If several sliders have the same DNA name, only the first slider gets it, and the others keep
+    Blender's names. Names that belong to no slider stay.
 
     Args:
         live: the character's Runtime.
@@ -419,7 +430,7 @@ def is_bent(curve: bpy.types.FCurve) -> bool:
 
 
 def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves of an action that move a datablock. Muted curves are left out.
+    """The F-curves of an action that move a datablock. Muted curves and groups are left out.
 
     Args:
         action: any action.
@@ -544,7 +555,8 @@ def _from_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[
 def add_sound(
     scene: bpy.types.Scene, path: str | Path, frame: float, name: str = ""
 ) -> bpy.types.SoundStrip:
-    """Add a sound strip to the sequencer, on the first free channel.
+    """Add a sound strip to the sequencer, on the first channel on which no strip ends later than
+    the start of the sound; on channel 128 if there is no such channel.
 
     Args:
         scene: the scene.

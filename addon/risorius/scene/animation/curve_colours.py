@@ -64,12 +64,13 @@ def colour_group(group: bpy.types.ActionGroup, region: str) -> None:
 
 
 def colour_curve(curve: bpy.types.FCurve, label: str, step: int | None = None) -> None:
-    """Give a new F-curve and its group the colour of a slider's region.
+    """Give a new F-curve the colour of a slider's region, and its group too if that has no colour.
 
     Args:
         curve: F-curve of a slider, in its group.
         label: name of the slider.
-        step: number of the shade, see colour_of; None: from the number of curves in the group.
+        step: number of the curve in its region, from 0, which chooses the shade; None: the number
+            of other curves in the group.
     """
     region = native.regions().of_slider(label)
     group = curve.group

@@ -44,8 +44,8 @@ class Rules:
         available: key only properties with an F-curve.
         needed: key only if the value differs from the curve.
         kind: type of the key, such as KEYFRAME or EXTREME.
-        interpolation, handles: interpolation and handle types of the first keys of a curve; a later
-            key copies the key before it.
+        interpolation, handles: interpolation and handle types of the first two keys of a curve; a
+            later key copies the key before it.
         keying_set: key only the paths of this set; None: no limit.
     """
 
@@ -162,7 +162,8 @@ def by_hand(
         context: has the settings and the current frame.
         rig: the character.
         move: a function that moves sliders and bones from their current values. It returns the
-            names of all sliders that it set, even to equal values; None if it did nothing.
+            names of all sliders that it set, even to equal values; None if it did nothing. At the
+            current frame, a slider that was set to an equal value is keyed if it has an F-curve.
         at_selected: True: move at every frame with a selected key of this face, and key all
             changes; False: move at the current frame.
         at: a function that is called before each move; its argument is the frame of the move.
@@ -172,7 +173,8 @@ def by_hand(
 
     Raises:
         FaceError: with at_selected, no key is selected or a tweak is active; without it, an active
-            tweak does not include the current frame. Nothing has changed.
+            tweak does not include the current frame, or is too weak there for a large rotation.
+            The controls then have their earlier values.
     """
     controls = parts.controls_there(rig)
     shown_keys.show_some(controls)
@@ -212,10 +214,14 @@ def changed(
         context: has the settings and the frame.
         rig: the character.
         labels: changed sliders.
-        bones: data paths of moved control bones, as in Pose.
+        bones: data paths of the moved control bones' rotations and locations.
 
     Returns:
         The number of keyed properties.
+
+    Raises:
+        FaceError: the active tweak does not include the current frame, or is too weak there for a
+            large rotation.
     """
     rules, controls = rules_of(context), parts.controls_there(rig)
     if tweaks.of(controls) is not None:
@@ -238,6 +244,10 @@ def key(
 
     Returns:
         The number of keyed properties.
+
+    Raises:
+        FaceError: the active tweak does not include the current frame, or is too weak there for a
+            large rotation.
     """
     controls, rules = parts.controls_there(rig), rules_of(context, auto=False)
     if tweaks.of(controls) is not None:
@@ -259,7 +269,7 @@ def _moved(before: Pose, after: Pose) -> tuple[list[str], list[str]]:
 
 
 def selected_frames(controls: ArmatureObject) -> list[float]:
-    """The frames at which F-curves of a face have selected keyframes, ascending."""
+    """The frames of selected keys of sliders and bones in the face's active action, ascending."""
     found = {
         round(key.co.x, 3)
         for path, curves in curves_by_path(controls).items()
@@ -353,10 +363,12 @@ def insert(
 
     Args:
         controls: the control armature.
-        labels: sliders to key; sliders with drivers are left out.
+        labels: sliders to key. If the face board leads, the handles that move these sliders are
+            keyed instead.
         bones: data paths of bones to key.
         frame: frame of the scene; need not be whole.
-        rules: settings for new keys.
+        rules: settings for new keys; properties that they exclude, and properties with drivers, get
+            no key. `rules.insert` is not read.
 
     Returns:
         The number of keyed properties.
@@ -430,9 +442,9 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of the newest key of a curve with at most two keys."""
+    """Set interpolation and handle types of the last key in time, if a curve has at most two."""
     if len(curve.keyframe_points) > 2:
-        return  # Blender copied them from the previous key
+        return  # Blender copied both settings from the previous key
     for key in (
         curve.keyframe_points[-1:] if len(curve.keyframe_points) > 1 else curve.keyframe_points
     ):

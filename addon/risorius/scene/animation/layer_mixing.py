@@ -70,7 +70,7 @@ class Bones:
 class Kept:
     """Cache of compiled layer sources (clips or poses) and of compiled masks.
 
-    The settings of a layer, see `_key`, identify its source and its mask.
+    The keys are the settings of a layer that determine its source or its mask.
     """
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
@@ -88,7 +88,8 @@ class Stack:
         layers: risorius.Layer, bottom to top, at weight 1.
         places: index of each compiled layer in the collection of settings.
         weights: the weights in the mixer, by the index of the layer in that collection.
-        problems: index of a layer, or name of a reaction -> reason why it cannot be played.
+        problems: index of a layer, or name of a reaction -> reason why it cannot be played;
+            "Reactions" -> a sentence if there are more reactions than can be played.
         kept: compiled sources and masks, which the next Stack can reuse.
     """
 
@@ -146,7 +147,8 @@ def mix(
         maximum: largest value of a slider.
 
     Returns:
-        float32[R] slider values and control bones with the layers applied.
+        float32[R] slider values and control bones with the layers applied; `raw` and `bones`
+        themselves if the character has no layer or its controls are baked.
     """
     controls = seen.original
     if not layers.has_any(controls) or parts.BAKED in controls:
@@ -237,7 +239,16 @@ def _compile(
     made_of: tuple[object, ...],
     old: Stack | None,
 ) -> Stack:
-    """Compile a new Stack. Args: old  the earlier Stack, whose unchanged curves are reused."""
+    """Compile a new Stack.
+
+    Args:
+        controls: the original control armature.
+        live: the character's Runtime.
+        rate: frames per second.
+        maximum: largest value of a slider.
+        made_of: the settings from which the Stack is made, for a later comparison.
+        old: the earlier Stack, whose unchanged curves are reused; None: there is none.
+    """
     same = old if old is not None and old.made_of[0] == made_of[0] else None
     stack = Stack(made_of, _mixer(controls, live, maximum) if same is None else same.mixer)
     kept = Kept() if same is None else same.kept
@@ -267,7 +278,13 @@ def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> n
 
 
 def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
-    """Fire all reactions of the character, so that frames can be evaluated in any order."""
+    """Fire all reactions of the character, so that frames can be evaluated in any order.
+
+    Args:
+        stack: the compiled layers; reactions that cannot be fired are added to its problems.
+        controls: control armature of the character.
+        rate: frames per second.
+    """
     stack.mixer.clear_fired()
     for reaction in layers.reactions_of(controls):
         try:
@@ -432,7 +449,7 @@ _SOURCES = {"ACTION": _action_source, "EXPRESSION": _expression_source, "IDLE": 
 
 
 def problems(controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene) -> list[str]:
-    """Sentences on layers that cannot be played.
+    """Sentences on layers and reactions that cannot be played.
 
     Args:
         controls: the original (not evaluated) control armature of the character.

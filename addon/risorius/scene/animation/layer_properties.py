@@ -54,7 +54,10 @@ def _still(
 ) -> object:
     """A property that cannot have keys or drivers, because it lacks the option ANIMATABLE.
 
-    Args: kind  function of bpy.props that makes the property, given  arguments of this function.
+    Args:
+        kind: function of bpy.props that makes the property.
+        options: options of the property.
+        given: further arguments of `kind`.
     """
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 
@@ -95,7 +98,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         bpy.props.PointerProperty,
         type=bpy.types.Action,
         name="Action",
-        description="Kind of the layer",
+        description="Action that the layer plays",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
     # Edition of the built-in expressions that the layer plays. The default is 1, because .blend
@@ -190,8 +193,8 @@ def register() -> None:
         name="Exclude Opposites",
         translation_context=tables.CONTEXT,
         description=(
-            "On a face with layers, prevent that opposite controls act together: "
-            "closed lips hold the jaw, a blink lowers wide lids"
+            "On a face with layers, prevent that opposite controls act together: pressed lips "
+            "close the jaw, a blink lowers wide lids"
         ),
         default=True,
     )

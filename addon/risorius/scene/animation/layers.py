@@ -75,7 +75,8 @@ def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bo
 def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) -> logic.Span:
     """The timing of an action in a layer: start, played frames, speed and warp points.
 
-    Without `action`, the action of the layer is used.
+    Without `action`, the action of the layer is used. A single warp point has no effect; two or
+    more replace the speed.
     """
     first, last = (action or layer.action).frame_range
     points = sorted((point.frame, point.source) for point in layer.warp)
@@ -114,6 +115,7 @@ def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
     """Add a warp point at a scene frame, with the frame of the animation that the layer shows then.
 
     The first warp point also adds one at each end of the layer, so that the timing does not change.
+    A frame that has a warp point gets no second one.
     """
     span = span_of(layer)
     shown = float(span.source(np.array([frame]))[0])
@@ -136,7 +138,7 @@ def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> R
 
     Args:
         controls: control armature.
-        kind: see layer_properties.KINDS.
+        kind: source of the layer: "ACTION", "EXPRESSION" or "IDLE".
         name: name in the list; a number is added if another layer has it.
         settings: other properties of the layer by name.
 
@@ -167,7 +169,7 @@ def _free_name(name: str, taken: Collection[str]) -> str:
 def add_action(
     controls: ArmatureObject, action: bpy.types.Action, **settings: object
 ) -> RISORIUS_PG_layer:
-    """Add a layer that plays an action at the frames of its keys.
+    """Add a layer that plays an action at the frames of the action.
 
     Args:
         controls: control armature of the character.
@@ -192,10 +194,11 @@ def place_of(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> int:
 
 
 def remove(controls: ArmatureObject, place: int) -> None:
-    """Remove a layer, and the keys of its weight unless another character plays them.
+    """Remove a layer, and the driver and the keys of its weight.
 
-    The collection entry stays, hidden, while an action has keys for its index, so that these keys
-    move no other layer.
+    The keys stay in linked actions and in actions that another datablock uses too. The collection
+    entry stays, hidden, while an action has keys for its index or a later entry exists, so that
+    keys move no other layer. In a library override it always stays.
 
     Args:
         controls: control armature of the character.
@@ -256,6 +259,9 @@ def _rank(there: Sequence[RISORIUS_PG_layer]) -> None:
 def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
     """Add a copy of a layer directly above this layer, and copy the keys of its weight.
 
+    Keys in linked actions, keys in actions that another datablock uses too, and a driver of the
+    weight are not copied.
+
     Args:
         controls: control armature of the character.
         place: index of the layer, from place_of.
@@ -283,7 +289,8 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
     """Yields collections of F-curves that belong to this armature alone.
 
-    These are the F-curves of each action that only this armature plays, and its drivers.
+    Each action that only this armature uses gives its F-curves; the last collection has the
+    drivers of the armature. Linked actions are left out.
     """
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
@@ -322,9 +329,12 @@ def copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
 def keep_weights(controls: ArmatureObject, before: bpy.types.Action | None) -> None:
     """Copy the keys of layer weights from the earlier action to the active action.
 
+    If there are such keys but no active action, a new action is made. A weight that has keys in the
+    active action keeps them.
+
     Args:
         controls: control armature.
-        before: the earlier active action, or None.
+        before: the earlier active action; None: nothing is copied.
     """
     old = compat.bag_for(before, controls) if before is not None else None
     curves = [c for c in old.fcurves if c.data_path.startswith(logic.COLLECTION)] if old else []

@@ -22,7 +22,9 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     """Convert layers to strips, bottom to top, up to the first layer that no strip can represent.
 
     This layer and all layers above it stay, because Blender evaluates the NLA before all layers.
-    Converted layers are muted. The active action becomes the lowest new strip.
+    Muted layers are skipped; if there are solo layers, all other layers are skipped too. Converted
+    layers are muted. If at least one layer is converted, the active action becomes the lowest new
+    strip.
 
     Args:
         scene: gives the frame rate.
@@ -36,7 +38,8 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
     playing = [layer for layer in settings if not layer.mute]
     if any(layer.solo for layer in playing):
         playing = [layer for layer in playing if layer.solo]
-    curves = [_weight_curve(controls, layer) for layer in playing]  # before _push_down
+    # The active action is read here, because `_push_down` unassigns it.
+    curves = [_weight_curve(controls, layer) for layer in playing]
     notes, count = [], 0
     for place, layer in enumerate(playing):
         trouble = obstacle(controls, layer, curves[place])
@@ -66,7 +69,7 @@ def obstacle(
     Args:
         controls: control armature.
         layer: settings of a layer.
-        curve: the F-curve of its weight, or None.
+        curve: the F-curve of the layer's weight, or None.
     """
     fades = layer.fade_in or layer.fade_out
     reasons = (
@@ -218,7 +221,14 @@ def _masked(
 
 
 def _is_left_out(path: str, allowed: Set[str]) -> bool:
-    """Whether the mask of a layer excludes an F-curve."""
+    """Whether the mask of a layer excludes an F-curve.
+
+    A rotation of a bone is excluded only if the mask excludes all its angles.
+
+    Args:
+        path: data path of the F-curve.
+        allowed: allowed data paths of sliders, and allowed names from `clip_units.BONES`.
+    """
     for bone, names in clip_logic.TURNS.items():
         if path.startswith(f'pose.bones["{bone}"].rotation_'):
             return not allowed & set(names)

@@ -21,7 +21,7 @@ from ..character import runtime
 from ..character.meshes import basis_of
 from . import clip_actions
 
-_HOTTEST_MM = 2.0  # smallest residual in mm that gets the hottest colour
+_HOTTEST_MM = 2.0  # the hottest colour shows the largest residual, but at least this many mm
 MOST_FRAMES = 20_000
 Floats = NDArray[np.float32]
 
@@ -60,7 +60,7 @@ def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
 
 
 def meant(rig: ArmatureObject, item: MeshObject) -> tuple[int, int]:
-    """The face mesh that has as many vertices as a source object: (its LOD, its index).
+    """The first face mesh that has as many vertices as a source object: (LOD, index of the mesh).
 
     Args:
         rig: the face.
@@ -149,7 +149,8 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
             rate: frames per second.
             relative: True: fit the motion of the recorded mesh away from its own neutral shape;
                 False: fit its shape at each frame.
-            sparse, smooth: see risorius.solve_clip.
+            sparse: factor of the price of a control's value; 0: no price, 1: the default.
+            smooth: factor of the price of a sudden change; 0: no price, 1: the default.
 
         Raises:
             ClipError: no mesh of the face has as many vertices as the recorded mesh.
@@ -189,7 +190,8 @@ def show_residual(rig: ArmatureObject, mesh: int, residual: Floats) -> float:
         residual: float32[V], distance in mm between each solved vertex and the recorded vertex.
 
     Returns:
-        The distance in mm that the hottest colour shows; 0 if the face lacks this mesh.
+        The distance in mm that the hottest colour shows; 0 if no object of the face is this mesh
+        with V vertices.
     """
     hottest = max(_HOTTEST_MM, float(residual.max(initial=0)))
     colours = heat_ramp.linear(heat_ramp.colours(residual.astype(np.float64) / hottest))

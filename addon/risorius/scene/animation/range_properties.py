@@ -22,7 +22,7 @@ SWITCH = "risorius_use_range"
 SOURCE = "risorius_range_source"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 _LEAST, _MOST = 0.1, 1.9  # limits of extreme minus neutral, equal to the limits in risorius.ranges
-# Counts the changes of ranges of all faces, so that caches notice them (see `changes`).
+# Number of changes of the capture ranges of all faces, which caches compare.
 _changes = session.value("range_properties.changes", 0, ("unregister",))
 
 
@@ -61,7 +61,7 @@ class RISORIUS_PG_range(bpy.types.PropertyGroup):
     )
     extreme: bpy.props.FloatProperty(
         name="Extreme",
-        description="Captured value at which the face can go no further, which becomes 1",
+        description="Captured value of the full movement, which becomes 1",
         default=1.0,
         min=0.0,
         max=2.8,
@@ -88,7 +88,7 @@ def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
 
 
 def all_of(controls: ArmatureObject) -> "native.Ranges":
-    """The ranges of a face, even if the use of ranges is switched off.
+    """The capture ranges of a face, even if the use of ranges is switched off.
 
     Args:
         controls: the control armature. A control with an invalid range counts as switched off.

@@ -58,8 +58,8 @@ def clip_of(
     Args:
         context: scene and view layer.
         item: a mesh object.
-        first, last: first and last frame to read; None: the first or last frame of the object's
-            action, or of the scene if there are NLA strips or drivers.
+        first, last: first and last frame to read; None: the first or last frame of the shape
+            keys' action, or of the scene if there are NLA strips or drivers.
 
     Returns:
         A clip with one curve for each shape key that moves or is not 0; frame 0 is second 0.

@@ -33,7 +33,13 @@ class SpeechTask(Task["native.Clip"]):
     """Makes the animation clip of a speech recording in a separate process."""
 
     def __init__(self, path: str, transcript: str | None, **options: object) -> None:
-        """Start the task. Args: path, transcript, options  see risorius.speech.speak."""
+        """Prepare the task.
+
+        Args:
+            path: the sound file.
+            transcript: the spoken words in English; None or "": the recogniser finds the words.
+            options: further keyword arguments of risorius.speech.speak, such as rate and intensity.
+        """
         folder = str(packages_folder())
         if folder not in sys.path:
             sys.path.append(folder)  # the new process searches the folders of this sys.path

@@ -62,7 +62,7 @@ class _Hand:
 
 @dataclass
 class _Below:
-    """Cached pose of the controls without the tweak, for a face with NLA strips.
+    """Cached pose of the controls without the tweak, for a face with NLA strips or blending.
 
     Attributes:
         frame: frame of the scene.
@@ -80,12 +80,13 @@ _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
 # Session uid of a control armature whose action was checked since load or undo -> its cached pose
 # without the tweak, or None.
 _known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
-# Session uid of a control armature -> reason why the tweak could not store the last key.
+# Session uid of a control armature -> reason why the tweak could not store the last key or moved
+# control.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
 
 def trouble(controls: ArmatureObject) -> str:
-    """The reason why the tweak could not store the last key; "" if it could.
+    """The reason why the tweak could not store the last key or moved control; "" if it could.
 
     Args: controls  a control armature.
     """
@@ -167,7 +168,8 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
     """The pose of the controls without the tweak.
 
-    On a face with NLA strips the pose is cached, because Blender has to evaluate the strips.
+    On a face with NLA strips or a blended active action the pose is cached, because Blender has to
+    evaluate it.
     """
     if not tweaks.is_mixed(controls):
         return tweaks.below_at(controls, tweak, frame)
@@ -200,7 +202,8 @@ def _strips(controls: ArmatureObject) -> tuple[object, ...]:
 def settle(controls: ArmatureObject) -> None:
     """Store in the tweak the controls that were moved without a key.
 
-    Nothing is stored if they were moved at a frame outside the tweak.
+    Nothing is stored if they were moved at a frame outside the tweak, or if the tweak is too weak
+    there for a large rotation; `trouble` then gives the reason.
 
     Args:
         controls: a control armature. The scene may have changed its frame since the move.
@@ -277,7 +280,18 @@ def _hands_of(
     inserted: dict[CurveName, list[float]],
     frame: float,
 ) -> list[_Hand]:
-    """A _Hand for each frame with new keys, the current frame last."""
+    """A _Hand for each frame with new keys, ascending, but the current frame last.
+
+    If the current frame has no new key but controls that the user moved there without a key, the
+    _Hand of these controls is the first.
+
+    Args:
+        controls: the control armature.
+        tweak: the active tweak.
+        curves: the curves of the active action, by data path and index.
+        inserted: curve's data path and index -> frames of its new keys.
+        frame: current frame of the scene.
+    """
     held = _hands.get(controls.session_uid)
     by_frame: dict[float, list[bpy.types.FCurve]] = {}
     for name, frames in inserted.items():
@@ -316,7 +330,7 @@ def _take_all(
     Then reset controls that were keyed at other frames: they get the values that they have at the
     current frame without the tweak.
 
-    hands: the moved controls, one _Hand for each frame; the last is of the current frame.
+    hands: the moved controls, one _Hand for each frame, from `_hands_of`.
     """
     with tweaks.curves_so_far(controls) as old:
         for hand in hands:
@@ -353,7 +367,8 @@ def _inserted(
 ) -> list[float] | None:
     """The frames of keys of `curve` that its earlier copy `before` lacks or has with other values.
 
-    None if the keys differ in another way, for example because keys were deleted.
+    None if the keys differ in another way: keys were deleted or moved in time, or without a new
+    key, the value of a key at a frame other than `frame` was changed.
     """
     frames, values = clip_actions.key_points(curve)
     if before is None:
@@ -378,7 +393,10 @@ def _restore(
     before: bpy.types.FCurve | None,
     frames: list[float],
 ) -> None:
-    """Restore the keys that a curve had in `before`; remove the curve if `before` is None."""
+    """Restore the keys that a curve had in `before`; remove the curve if `before` is None.
+
+    Interpolation and types of keys are restored only at `frames`, the frames of inserted keys.
+    """
     if before is None:
         bag = compat.bag_for(action, controls)
         if bag is not None:
@@ -401,7 +419,11 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """The controls that differ from the pose without the tweak; None if none does."""
+    """The controls that differ from the pose without the tweak; None if none does.
+
+    Sliders with drivers are left out. If the face board leads, its handles are compared instead of
+    the sliders.
+    """
     rig = parts.rig_of(controls)
     if rig is None:
         return None

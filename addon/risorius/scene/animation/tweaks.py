@@ -32,7 +32,7 @@ _REST = (0.0, 0.0, 0.0)  # rest location of the gaze target
 _FARTHEST = (179.0, 89.0, 179.0)  # degrees of yaw, pitch and roll that a layer can hold
 
 
-Curves = Mapping[tuple[str, int], bpy.types.FCurve]  # by data path and index
+Curves = Mapping[tuple[str, int], bpy.types.FCurve]  # by data path and array index
 Rows = dict[str, tuple[float, ...]]
 
 
@@ -123,7 +123,7 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
     Args:
         controls: the control armature.
         first, last: first and last frame of the tweak.
-        fade: length of the fade at each end in frames.
+        fade: length of the fade at each end in frames; at most half the range is used.
 
     Raises:
         FaceError: the range is shorter than two frames, or the fade is negative.
@@ -159,7 +159,8 @@ def take(
 ) -> int:
     """Store edited sliders and bones in the tweak at a frame.
 
-    The sliders and bones are then reset to the values of the keys below the tweak.
+    The sliders and bones are then reset to the values of the keys below the tweak. If the face
+    board leads, all sliders that moved handles change are stored too, and the handles are reset.
 
     Args:
         controls: control armature with an active tweak.
@@ -269,7 +270,17 @@ def _bone_rows(
     weight: float,
     held: bool,
 ) -> dict[str, list[float]]:
-    """Data path -> key values with which the tweak's layer reproduces the current bone poses."""
+    """Data path -> key values with which the tweak's layer reproduces the current bone poses.
+
+    Args:
+        controls: the control armature.
+        asked: data path -> name of the bone, for the properties to store.
+        below: the pose without the tweak.
+        old: curves of the tweak's layer, to which the changes are added.
+        frame: frame of the scene.
+        weight: weight of the layer at this frame.
+        held: True: properties without a change get keys too if the layer has keys of them.
+    """
     rows = {}
     for path, name in asked.items():
         bone = controls.pose.bones[name]
@@ -312,7 +323,14 @@ def _rows_of(curves: Curves, path: str) -> list[bpy.types.FCurve | None]:
 def _insert(
     controls: ArmatureObject, tweak: Tweak, rows: Mapping[str, Sequence[float]], frame: float
 ) -> None:
-    """Insert keys into the layer of a tweak. Args: rows  components by data path."""
+    """Insert keys into the layer of a tweak.
+
+    Args:
+        controls: the control armature.
+        tweak: the active tweak; its layer is made if it does not exist.
+        rows: data path -> value of each component.
+        frame: frame of the scene.
+    """
     layer = _layer(controls, tweak)
     action = layer.action
     bag = compat.bag_for(action, controls)
@@ -387,7 +405,8 @@ def put(controls: ArmatureObject, stand: Stand) -> None:
 def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
     """The pose of the controls without the tweak.
 
-    On a face with NLA strips, Blender evaluates the pose in a separate dependency graph.
+    On a face with NLA strips or a blended active action, Blender evaluates the pose in a separate
+    dependency graph.
 
     Args:
         controls: the control armature.
@@ -442,8 +461,14 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
 
 
 def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
-    """Slider -> change of its value by moved handles, if the face board leads. The handles return
-    to the pose without the tweak."""
+    """Slider -> change of its value by moved handles; empty unless the face board leads.
+
+    The handles return to the pose without the tweak.
+
+    Args:
+        controls: the control armature.
+        below: the pose without the tweak.
+    """
     rig = parts.rig_of(controls)
     if rig is None or not board.leads_face(rig):
         return {}
@@ -453,7 +478,7 @@ def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
 
 
 def _layer(controls: ArmatureObject, tweak: Tweak) -> layer_properties.RISORIUS_PG_layer:
-    """The layer of a tweak; created if it does not exist."""
+    """The layer of a tweak; a new one is made if it does not exist or has lost its action."""
     found = _layer_of(controls, tweak)
     if found is not None and found.action is not None:
         return found

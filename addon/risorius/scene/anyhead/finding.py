@@ -41,8 +41,8 @@ class Head(NamedTuple):
 
     Attributes:
         parts: the meshes, the face first, in the coordinates of the package.
-        turn: float64[3, 3], rotation matrix from the coordinates of the head's object to the
-            coordinates of the package.
+        turn: float64[3, 3], matrix from the coordinates of the head's object to the coordinates of
+            the package: rotation, scale and conversion to cm; both origins are the same.
         fixed: landmarks that the user moved or placed, in the coordinates of the package.
         named: name of the object that is the face; "": the package chooses one of the meshes.
     """
@@ -125,7 +125,7 @@ def surface_of(part: native.HeadPart) -> native.HeadSurface:
 
 
 def find_task(head: Head) -> Task[Finding]:
-    """A background task that finds the landmarks of a head, the result of `read`."""
+    """A background task that finds the landmarks of a head. Args: head  from `read`."""
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Finding:
         return on_object(head, _search(head, telling(progress, cancelled)))

@@ -15,7 +15,8 @@ from . import points
 
 def head_of(context: Context) -> MeshObject | None:
     """The head of a selected landmark, a selected mesh with landmarks, the active mesh, or the
-    selected mesh with most vertices, in this order. None if only parts of faces are selected.
+    selected mesh with most vertices, in this order. Meshes of imported faces and meshes without
+    polygons do not count; None if no other mesh is selected.
 
     Args:
         context: has the selection.
@@ -35,7 +36,9 @@ def head_of(context: Context) -> MeshObject | None:
 
 
 def face_of(context: Context) -> ArmatureObject | None:
-    """The selected face; without a selected face the only face of the scene; else None.
+    """The face to which selected objects belong; without such objects the scene's only face.
+
+    None if the selected objects belong to several faces, or if the scene has no face or several.
 
     Args:
         context: has the selection.
@@ -54,7 +57,8 @@ def face_there(context: Context) -> ArmatureObject:
         context: has the selection.
 
     Raises:
-        FaceError: there is no face, or there are several.
+        FaceError: several faces are selected, or none is selected and the scene does not have
+            exactly one face.
     """
     rig = face_of(context)
     if rig is None:

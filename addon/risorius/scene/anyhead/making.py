@@ -17,8 +17,8 @@ Progress = Callable[[float], None]
 Cancelled = Callable[[], bool]
 
 FIT, JOINTS = "FIT", "JOINTS"  # stages of a task
-_FITTED = 0.6  # share of the total time after which the head has its expressions
-_CARRIED = 0.9  # of that, at the end of the transfer of expressions
+_FITTED = 0.6  # progress of the whole task when stage FIT ends: the head has its expressions
+_CARRIED = 0.9  # progress of stage FIT when the transfer of expressions ends
 
 
 class HeadTask(Task[Result], Generic[Result]):
@@ -56,7 +56,7 @@ class Template(NamedTuple):
     path: str = ""
 
     def load(self) -> native.Dna:
-        """Load the template face, unless it is a face of the scene.
+        """The face as a Dna: the face of the scene, or else the face in the file, which is read.
 
         Raises:
             DnaError: the file is not a DNA file.
@@ -129,6 +129,12 @@ def _carry_over(
     """The head with the expressions of the template, and a face whose rig has only blend shapes.
 
     The face is made from the head with its expressions; it has no joints.
+
+    Args:
+        head: the result of finding.read.
+        template: the face with the expressions.
+        transfer: options of the transfer.
+        progress: function that is called with the progress, 0 to 1; it returns False to cancel.
     """
     dna, own = template.load(), {part.source for part in head.parts}
     onto, parts = native.part("anyhead.onto"), native.part("author.heads.parts")
@@ -153,7 +159,13 @@ def _carry_over(
 
 
 def _write(dna: native.Dna, read: native.Read, path: str) -> None:
-    """Write a face and the textures of its materials."""
+    """Write a face and the textures of its materials.
+
+    Args:
+        dna: the face; names of textures are added to its metadata.
+        read: the face before its joints were made, with the materials of the head.
+        path: path of the new DNA file.
+    """
     textures = native.part("author.heads.textures")
     found = textures.textures_of(read.materials, textures.texture_folder(Path(path)))
     named = textures.metadata_of(dna.mesh_names, read.materials, found)

@@ -25,7 +25,7 @@ COLORS: dict[str, tuple[float, float, float, float]] = {
     PLACED: (0.2, 0.5, 1.0, 1.0),
 }
 _SIZE = 0.012  # size of an empty / largest side of the box around all landmarks
-_STAYED = 1e-4  # of that side: a landmark this close to the place where it was found is not moved
+_STAYED = 1e-4  # a landmark counts as moved from this distance to its found place / that side
 
 
 class Point(NamedTuple):
@@ -72,7 +72,11 @@ def of(head: bpy.types.Object) -> dict[str, Point]:
 
 
 def by_hand(points: Mapping[str, Point]) -> dict[str, Doubles]:
-    """Positions of the landmarks that the user moved or placed. `points` is the result of `of`."""
+    """Name -> position of the landmarks that the user moved or placed, in the head's object space.
+
+    Args:
+        points: all landmarks of the head by name.
+    """
     return {name: point.place for name, point in points.items() if point.state != FOUND}
 
 
@@ -82,6 +86,8 @@ def show(
     found: Mapping[str, Place],
 ) -> None:
     """Show landmarks that were found. Landmarks that the user moved or placed stay unchanged.
+
+    Other empties of landmarks that `found` does not contain are deleted.
 
     Args:
         context: has the scene.
@@ -196,6 +202,6 @@ def _size(places: Iterable[Doubles]) -> float:
 
 
 def head_of(item: bpy.types.Object | None) -> MeshObject | None:
-    """The head of a landmark; None if the object is not a landmark."""
+    """The head of a landmark; None if the object is no landmark or its parent is no mesh."""
     above = item.parent if item is not None and is_point(item) else None
     return cast(MeshObject, above) if above is not None and above.type == "MESH" else None

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes the animation of a face to actions, and restores the unbaked face.
 
-Only actions move a baked face. The evaluator skips it, so that no property is driven twice and the
-face looks the same in a Blender without the add-on. Armatures and shape keys store their earlier
-animation, which is restored when the bake is removed.
+There are two kinds of bakes. RESULT: only actions move the face. The evaluator skips it, so that no
+property is driven twice and the face looks the same in a Blender without the add-on. CONTROLS: one
+action moves the controls in place of their layers, NLA and drivers, and the evaluator still moves
+the face. Armatures and shape keys store their earlier animation, which is restored when the bake is
+removed.
 """
 
 from __future__ import annotations
@@ -45,7 +47,8 @@ class BakeOptions:
         lod: level of detail of a RESULT; -1: the level in the viewport.
         wanted: parts of a RESULT to bake, from "BONES", "SHAPES", "MAPS"; the others get no
             animation.
-        error: largest error of the key reduction, see key_reduction.reduce_keys; 0: keep all keys.
+        error: largest difference of a value after the key reduction, in the units of the values;
+            0: keep every key of a curve that moves.
         strip: True: add the actions as strips of new NLA tracks; False: make them active.
     """
 
@@ -124,14 +127,15 @@ def bake(
         options: range, kind and parts of the bake.
 
     Yields:
-        The progress, 0 to 1. No character changes before the last value.
+        The progress, 0 to 1. Until the last value, only previews of channels are ended; the
+            characters do not change otherwise.
 
     Returns:
         Sentences for a report, one for each character.
 
     Raises:
         BakeError: a character cannot be baked; none was baked.
-        ValueError: the range has no frame.
+        ValueError: the range ends before it starts, or the step is not above 0.
     """
     for rig in rigs:
         trouble = refusal(rig, options.kind) or controls_ahead.examine(

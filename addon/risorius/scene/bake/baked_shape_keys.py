@@ -9,7 +9,7 @@ from ..base import parts, saved
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import build, meshes, runtime
 
-OPENED = "risorius_opened"  # on a Key: "channel name" of each shape key that was made for a bake
+OPENED = "risorius_opened"  # on a Key: "channel index, space, name" of each shape key for a bake
 
 
 def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict[int, str]:
@@ -24,8 +24,8 @@ def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict
         used: indices of the channels that differ from 0 in the bake.
 
     Returns:
-        Index of a channel -> name of its shape key; empty if the mesh has another number of
-        vertices than in the DNA file.
+        Index of a channel -> name of its shape key; empty if the mesh has no shape keys, is not in
+        the DNA file, or has another number of vertices than there.
     """
     dna_mesh = runtime.dna_mesh(live, item)
     key = item.data.shape_keys

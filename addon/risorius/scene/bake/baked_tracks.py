@@ -51,7 +51,9 @@ def rig_tracks(
     wanted: Collection[str],
     target: ArmatureObject | None = None,
 ) -> list[Track]:
-    """Tracks of the deforming armature. The target gets the values of the first frame.
+    """Tracks of the deforming armature.
+
+    Bones and arrays that the rig writes get the values of the first frame in the target.
 
     Args:
         rig: the character's deforming armature.
@@ -62,7 +64,8 @@ def rig_tracks(
         target: the armature that will play the tracks: a copy of the rig; None: the rig.
 
     Returns:
-        Tracks of bones, animated maps, blend shape channels, and other animated properties.
+        Tracks of bones, animated maps, blend shape channels that the user's drivers read, the
+        object transform, and other properties that the user animates.
     """
     target = target or rig
     found = {t.path: t for t in _others(samples.others.get(rig, {}), rig)}
@@ -86,7 +89,7 @@ def _is_array(path: str) -> bool:
 
 
 def _others(values: Mapping[str, list[list[float]]], owner: bpy.types.ID) -> Iterator[Track]:
-    """Tracks of sampled properties that the user animates and the rig does not compute."""
+    """A track for each sampled property. Args: values  data path -> components at each frame."""
     for path, rows in values.items():
         group = path.split('"')[1] if '"' in path else "Object Transforms"
         indexed = len(rows[0]) > 1
@@ -137,6 +140,12 @@ def _place(rig: ArmatureObject, samples: sampling.Samples, target: ArmatureObjec
 
     Empty if the rig does not follow the control armature, has a parent or constraints, or does not
     move.
+
+    Args:
+        rig: the character's deforming armature.
+        samples: inputs of the face, from sampling.sample.
+        target: the armature that will play the tracks; if the rig does not move, it gets the
+            transform.
     """
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return []
@@ -172,7 +181,15 @@ def _array(
 ) -> list[Track]:
     """Tracks of an array property, one for each of the given indices; None: all indices.
 
-    The property gets the values of the first frame.
+    The property gets the values of the first frame. Empty if the property has another length than
+    `values` has columns.
+
+    Args:
+        target: the armature with the property.
+        name: name of the property.
+        values: float32[N, width], the values at N frames.
+        group: name of the group of the F-curves.
+        indices: indices of the entries to bake.
     """
     if len(target.get(name, ())) != values.shape[1] or not values.shape[1]:
         return []
@@ -208,7 +225,7 @@ def key_tracks(
         key: the Key datablock.
         names: index of a blend shape channel -> name of its shape key.
         weights: float32[N, B], blend shape weights at N frames.
-        others: data path -> values of shape keys that the user animates, see Samples.
+        others: data path -> values at the N frames, of shape keys that the user animates.
 
     Returns:
         One track for each key in `names`, and for each path in `others`.
@@ -237,8 +254,8 @@ def control_tracks(
         samples: inputs of the face, from sampling.sample.
 
     Returns:
-        Tracks. `actions.write` makes no curve for a slider that always has its rest value, or for a
-        property of a bone that always has its current value.
+        Tracks. `actions.write` makes no curve for a slider that has its rest value now and at all
+        frames, or for a property of a bone that has its current value at all frames.
     """
     face = controls.pose.bones[parts.FACE]
     found = {t.path: t for t in _others(samples.others.get(controls, {}), controls)}

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads the inputs of a face (sliders, rotations, other animation) at the frames of a range.
 
-Blender evaluates actions, NLA, drivers and constraints in a separate scene that has only the two
-armatures of the face and the objects they depend on, such as the armature of its body. The result
+Blender evaluates actions, NLA, drivers and constraints in a separate scene. The scene has only the
+two armatures of the face, the meshes whose shape keys the user animates, and the objects on which
+these depend, such as the armature of the body. The result
 of every frame equals frame stepping in the user's scene. Other objects of the user's scene are not
 evaluated, and its current frame does not change. A few features need the user's
 scene itself (`_needs_whole_scene`); its frame is restored afterwards.
@@ -115,6 +116,11 @@ def _stage(
     """Context manager: the scene in which frames are evaluated.
 
     This is a new scene with the given objects, or the user's scene if necessary.
+
+    Args:
+        context: its scene is the user's scene.
+        rigs: deforming armatures of the sampled faces.
+        items: objects for the new scene.
     """
     if _needs_whole_scene(context.scene, rigs):
         with _whole_scene(context.scene) as scene:
@@ -276,10 +282,12 @@ class _Reader:
     def _read_control_bones(
         self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Store the matrices of the control bones for one frame, see Samples.basis.
+        """Store the matrices of the control bones, relative to their rest pose, for one frame.
 
-        Args: number  index of the frame, seen  the evaluated control armature, own  rotations and
-        gaze target after the layers are mixed.
+        Args:
+            number: index of the frame.
+            seen: the evaluated control armature.
+            own: rotations and gaze target after the layers are mixed.
         """
         basis = self.samples.basis
         for name, matrices in basis.items():

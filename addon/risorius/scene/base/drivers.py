@@ -26,7 +26,10 @@ _WITH_NODES = (
 
 
 def owners() -> Iterator[bpy.types.ID]:
-    """Every datablock that can have drivers, including node trees inside other datablocks."""
+    """Every datablock of this .blend, and the node trees inside datablocks.
+
+    Every driver belongs to one of them; not all of them can have drivers.
+    """
     for kind in bpy.data.bl_rna.properties:
         if kind.type != "COLLECTION":
             continue
@@ -58,6 +61,9 @@ class Entries:
     Args:
         rig: deforming armature.
         labels: "channels" and "maps" -> (labels in the old order, labels in the new order).
+
+    Attributes:
+        gone: old labels of channels and maps that drivers read and the new order lacks.
     """
 
     def __init__(
@@ -96,6 +102,11 @@ class Entries:
         """Data path of a property with value 0 that replaces a removed channel or map.
 
         Drivers that read the removed channel or map stay valid with this path.
+
+        Args:
+            target: a driver target that reads the channel or map.
+            array: "channels" or "maps".
+            label: label of the removed channel or map.
         """
         key = _gone_key(array, label)
         assert target.id is not None

@@ -14,7 +14,7 @@ WORDS = (
 
 
 def be_born(controls: ArmatureObject) -> None:
-    """Store the current version number on a new character. Args: controls  its control armature."""
+    """Store the version number and the text NEEDS on a character. Args: controls  new armature."""
     controls[VERSION] = PRESENT
     controls[NEEDS] = WORDS
 

@@ -14,55 +14,60 @@ RIG = "risorius_rig"  # on meshes and control armature: the deforming armature
 CONTROLS = "risorius_controls"  # on the deforming armature: the control armature
 DNA = "risorius_dna"  # on the deforming armature: the Text that holds the DNA file
 LOD = "risorius_lod"  # on the deforming armature: the level that the viewport shows
-LOD_RENDER = "risorius_lod_render"  # on the deforming armature: level in renders, -1: LOD
+LOD_RENDER = "risorius_lod_render"  # on the deforming armature: level in renders; -1: as LOD
 LOD_BY_DISTANCE = (
     "risorius_lod_by_distance"  # on the rig: whether camera distance chooses the level
 )
-LOD_DISTANCES = (
-    "risorius_lod_distances"  # on the rig: entry n: distance of the change to level n + 1
-)
+# On the rig: entry n is the camera distance in Blender units at which level n + 1 begins.
+LOD_DISTANCES = "risorius_lod_distances"
 FOLLOW = "risorius_follow"  # on the rig: whether it copies the transform of the control armature
 UNIT = "risorius_unit"  # on the deforming armature: metres per Blender unit at import
 SOURCE = "risorius_source"  # on the deforming armature: path of the imported file
 TEXTURES = "risorius_textures"  # on the deforming armature: text about the textures found
-OVERDRIVE = "risorius_overdrive"  # on the control armature: hard maximum is 1.5
+OVERDRIVE = "risorius_overdrive"  # on the control armature: whether sliders reach 1.5, not 1
 RANGES = "risorius_ranges"  # on the control armature: capture range, see range_properties.py
 CURVES = "risorius_curves"  # on the control armature: unknown curves, see unknown_curves.py
 BODY_NECK = "risorius_body_neck"  # on the control armature: neck bones of the body, one per line
 BODY_HEAD = "risorius_body_head"  # on the control armature: head bone of the body
 MESH_PREFIX = "risorius_mesh_"  # prefix of numbered properties of the rig: pointers to its meshes
 MESH = "dna_mesh"  # on a mesh object: index of its mesh in the DNA file
-RESIDUAL = "risorius_residual"  # colour attribute: distance of solved curves from the source mesh
+RESIDUAL = "risorius_residual"  # colour attribute: distance of the solved face from the source mesh
 LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: index of its joint in the DNA file
-HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: value that was last written to the flag
+# On a mesh object, before the name of a flag such as hide_render: the last written value of the
+# flag.
+HIDDEN_PREFIX = "risorius_"
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
 # On a mesh object in Direct mode (see direct.py): persistent uid of its Armature modifier, which
 # is switched off.
 FINISHED = "risorius_finished"
 SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" forbids Direct mode
-JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: an older file showed its joints
+JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: saved with shown joints by an old add-on
 VALUES = "risorius_values"  # on the deforming armature: the mesh that drivers read maps from
 NAMES = "risorius_names"  # on a Mesh: names that the user assigned to shape keys, see assigned.py
 LANDMARK = "risorius_landmark"  # on an empty: name of its head landmark, see points.py
 LANDMARK_FOUND = "risorius_landmark_found"  # on the empty: detected position in the head's space
 LANDMARKS = "risorius_landmarks"  # on a collection: marks it as container of head landmarks
-REAL = "risorius_real"  # on a Key: channels that are real keys although the mesh is LIVE
+REAL = "risorius_real"  # on a Key of a LIVE mesh: channels that have a shape key of their own
 KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: channel -> name given by the user
 KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: channels in the user's order of keys
-CHANNEL_VARIABLE = "risorius_channel"  # driver variable that identifies keys of the add-on
+# Name of the driver variable by which the add-on recognises its shape keys of single channels.
+CHANNEL_VARIABLE = "risorius_channel"
 TEST = (
     "risorius_test"  # on the deforming armature: a channel's test override, see channel_preview.py
 )
 LOOK = "risorius_look"  # on the deforming armature: solo and mute settings, see look_masks.py
-HEAT = "risorius_heat"  # on the rig: kind of its heat map; on meshes: name of the colour attribute
-HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with a heat map: the colours active before
-BAKED = "risorius_baked"  # on rig or controls: notes of a bake; a baked rig is not live
+# On the rig: kind, largest motion and contents of its heat map. A colour attribute of the coloured
+# meshes has this name too.
+HEAT = "risorius_heat"
+HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with a heat map: colour attributes active before
+# On rig or controls: settings of a bake. The evaluator skips a rig that has this property.
+BAKED = "risorius_baked"
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature with the control properties
 PART = "risorius_part"  # on a control bone: its role, such as "head", also after renaming
-OUTLINES = "risorius_outlines"  # on the control armature: sizes of its hidden outlines, by PART
+OUTLINES = "risorius_outlines"  # on the control armature: scale of each hidden outline, by PART
 BOARD = "risorius_board"  # on a bone of the face board: its original name
 BOARD_KIND = "risorius_board_kind"  # on the control armature: "PRIMARY"; missing: complete board
 LEAD = "risorius_lead"  # on the control armature: "BOARD" if the face board moves the face
@@ -105,7 +110,7 @@ def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
 
 
 def controls_of(rig: ArmatureObject) -> ArmatureObject | None:
-    """The control armature of a character, or None if it was deleted."""
+    """The control armature of a character; None if it was deleted or lacks the bone FACE."""
     controls = cast("ArmatureObject | None", saved.item(rig, CONTROLS))
     if controls is None or controls.type != "ARMATURE" or FACE not in controls.pose.bones:
         return None

@@ -44,14 +44,27 @@ def number(
     low: float = -sys.float_info.max,
     high: float = sys.float_info.max,
 ) -> float:
-    """The finite number in a custom property. Args: owner, key, default, low, high  see `whole`."""
+    """The finite number in a custom property.
+
+    Args:
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
+        default: returned if the value is missing or out of range.
+        low, high: the range, ends included.
+    """
     found = owner.get(key)
     usable = isinstance(found, int | float) and math.isfinite(found) and low <= found <= high
     return float(cast("float", found)) if usable else default
 
 
 def text(owner: Owner, key: str, default: str = "") -> str:
-    """The string in a custom property. Args: owner, key, default  see `whole`."""
+    """The string in a custom property.
+
+    Args:
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
+        default: returned if the property is missing or no string.
+    """
     found = owner.get(key)
     return found if isinstance(found, str) else default
 
@@ -60,7 +73,9 @@ def wholes(owner: Owner, key: str, low: int = -_MOST, high: int = _MOST) -> list
     """The whole numbers of a list property that are in a range; other entries are left out.
 
     Args:
-        owner, key, low, high: see `whole`.
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
+        low, high: the range, ends included.
     """
     return [n for n in _entries(owner, key) if type(n) is int and low <= n <= high]
 
@@ -69,19 +84,31 @@ def numbers(owner: Owner, key: str, low: float = -math.inf, high: float = math.i
     """The finite numbers of a list property that are in a range; other entries are left out.
 
     Args:
-        owner, key, low, high: see `whole`.
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
+        low, high: the range, ends included.
     """
     found = [float(n) for n in _entries(owner, key) if isinstance(n, int | float)]
     return [n for n in found if math.isfinite(n) and low <= n <= high]
 
 
 def texts(owner: Owner, key: str) -> list[str]:
-    """The strings of a list property; other entries are left out. Args: owner, key  see `whole`."""
+    """The strings of a list property; other entries are left out.
+
+    Args:
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
+    """
     return [word for word in _entries(owner, key) if isinstance(word, str)]
 
 
 def table(owner: Owner, key: str) -> Mapping[str, object] | None:
-    """A copy of a group of custom properties; None if missing. Args: owner, key  see `whole`."""
+    """A copy of a group of custom properties; None if missing.
+
+    Args:
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
+    """
     found = owner.get(key)
     return (
         cast("dict[str, object]", found.to_dict()) if isinstance(found, IDPropertyGroup) else None
@@ -89,13 +116,23 @@ def table(owner: Owner, key: str) -> Mapping[str, object] | None:
 
 
 def item(owner: Owner, key: str) -> bpy.types.Object | None:
-    """The object that a property points to, or None. Args: owner, key  see `whole`."""
+    """The object that a property points to, or None.
+
+    Args:
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
+    """
     found = owner.get(key)
     return found if isinstance(found, bpy.types.Object) else None
 
 
 def length(owner: Owner, key: str) -> int:
-    """The length of an array property; 0 if it is missing. Args: owner, key  see `whole`."""
+    """The length of an array property; 0 if it is missing.
+
+    Args:
+        owner: the datablock, bone or table with the property.
+        key: name of the property.
+    """
     found = owner.get(key)
     return len(cast("list[float]", found)) if isinstance(found, IDPropertyArray) else 0
 

@@ -66,8 +66,8 @@ class _Entry:
         self.clear, self.is_new = clear, is_new
 
 
-_entries: dict[str, _Entry] = {}  # by name, so that a reloaded module replaces its entry
-_by_end: dict[str, list[_Entry]] = {}  # prepared, because `end` runs at each frame
+_entries: dict[str, _Entry] = {}  # by name of the value: a reloaded module replaces its entry
+_by_end: dict[str, list[_Entry]] = {}  # by event; prepared, because `end` runs at each frame
 
 
 def table(  # the annotation of the assigned variable gives the types
@@ -89,7 +89,8 @@ def keep(name: str, make: Callable[[], Kept], ends: Sequence[End]) -> Kept:
     """Create a dict, set, list, deque, weak dictionary or record that events reset.
 
     Args:
-        name, ends: see `table`.
+        name: unique name of the object.
+        ends: events that reset the object; `unregister` does too, unless `quit` is given.
         make: function that makes the initial object. A record is an instance without __slots__.
 
     Returns:
@@ -107,7 +108,8 @@ def value(name: str, start: Kept, ends: Sequence[End]) -> Slot[Kept]:
     """Create a holder of a single value that events reset.
 
     Args:
-        name, ends: see `table`.
+        name: unique name of the value.
+        ends: events that reset the value; `unregister` does too, unless `quit` is given.
         start: initial value, also after each event; must not be changed in place.
 
     Returns:
@@ -126,7 +128,7 @@ def cached(ends: Sequence[End], most: int = 128) -> Callable[[Function], Functio
     """Decorator: cache results of a function by its arguments.
 
     Args:
-        ends: see `table`.
+        ends: events that empty the cache; `unregister` does too, unless `quit` is given.
         most: largest number of results; the least recently used are dropped.
     """
 
@@ -142,7 +144,7 @@ def adopt(ends: Sequence[End], *functions: Callable[..., object]) -> None:
     """Let events empty the caches of functions in modules that do not use this module.
 
     Args:
-        ends: see `table`.
+        ends: events that empty the caches; `unregister` does too, unless `quit` is given.
         functions: functions with the decorator functools.cache or lru_cache.
     """
     for function in functions:
@@ -150,10 +152,10 @@ def adopt(ends: Sequence[End], *functions: Callable[..., object]) -> None:
 
 
 def at(*ends: End) -> Callable[[Function], Function]:
-    """Decorator: call a function without arguments at events, to release its resources.
+    """Decorator: call the decorated function at events, to release resources.
 
     Args:
-        ends: see `table`.
+        ends: events at which the function is called; at `unregister` too, unless `quit` is given.
     """
 
     def decorate(function: Function) -> Function:

@@ -76,7 +76,8 @@ def keep() -> None:
 def separate(exact: bool = False, spaces: bool = True) -> list[str]:
     """Give characters a copy of the unedited image, if a shared image was edited.
 
-    The edited image stays with the active character.
+    The edited image stays with the active character, or with the first character that shows it. If
+    the bytes of the unedited image are not known, all characters keep the edited image.
 
     Args:
         exact: compare packed bytes too, which is slow; used before a save.

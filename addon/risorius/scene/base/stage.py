@@ -38,6 +38,9 @@ class Stage:
 
     Args:
         roots: objects to evaluate.
+
+    Attributes:
+        roots: (session uid, memory address) of each of these objects.
     """
 
     def __init__(self, roots: Sequence[bpy.types.Object]) -> None:
@@ -84,8 +87,8 @@ class Stage:
 def alone(armatures: Iterable[ArmatureObject]) -> Iterator[None]:
     """Context manager: the controls do not point to their faces while a graph is built.
 
-    A graph includes all objects that custom properties point to. The meshes of the face and their
-    shape keys would therefore be copied at each frame.
+    A graph includes all objects that custom properties point to. Otherwise the meshes of the face
+    and their shape keys would be copied at each frame.
 
     Args:
         armatures: control armatures.

@@ -24,7 +24,7 @@ _LENGTH = "risorius_length"  # length of the unpacked file in bytes; missing in 
 # DNA files pack to between a half and a fifth of their size. A file that would unpack to more than
 # this limit is stored uncompressed.
 _MOST_TIMES = 32
-_ALWAYS = 1 << 16  # bytes
+_ALWAYS = 1 << 16  # bytes that every file may unpack to
 _PIECE = 1 << 20  # bytes that are unpacked at once
 _SIGNATURE = b"DNA"  # first bytes of every DNA file
 
@@ -120,7 +120,7 @@ def content(text: object) -> bytes:
     """The bytes of the DNA file in a Text.
 
     Raises:
-        ContentError: the bytes were changed or damaged, or `text` is not a Text.
+        ContentError: the bytes were changed or damaged, or `text` is not a Text with a DNA file.
     """
     packed = text.get(_BYTES) if isinstance(text, bpy.types.Text) else None
     if not isinstance(text, bpy.types.Text) or not isinstance(packed, bytes):
@@ -140,7 +140,7 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
     if said is None:
         return _most(packed)
     if not isinstance(said, str) or not said.isdecimal() or len(said) > 15:
-        raise ContentError(told("the stored length of its file is no number"))
+        raise ContentError(told("the stored length of the DNA file is no number"))
     if int(said) > _most(packed):
         raise ContentError(
             told(

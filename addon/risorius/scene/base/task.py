@@ -61,7 +61,7 @@ class Task(Generic[Result]):
         """Do the work in the calling thread, and store its result or error."""
         try:
             self.result = self._work(self._progress, self._cancelled.is_set)
-        except Exception as error:  # noqa: BLE001  a thread's error is told by who waits for it
+        except Exception as error:  # noqa: BLE001  the code that waits for the thread reports it
             self.error = error
 
     def _progress(self, share: float) -> None:

@@ -23,7 +23,7 @@ SHELF = "Joints"  # the hidden bone collection of the deforming bones
 LIVE_PROPERTIES = (parts.MAPS, parts.CHANNELS)
 
 Point = tuple[float, float, float]
-BonePlace = tuple[Point, Point, float, str]  # position, axis, length, name of the parent
+BonePlace = tuple[Point, Point, float, str]  # position, axis, length, parent's name
 
 
 @contextmanager
@@ -178,10 +178,12 @@ def build_rig(
 
 
 def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Add drivers to the rig so that Blender evaluates the controls even if they are hidden.
+    """Add a driver to the rig so that Blender evaluates the controls even if they are hidden.
+
+    If the rig has this driver already, its variables are only pointed at `controls`.
 
     Blender skips hidden objects that no visible object depends on, and the face would not move. The
-    drivers read each control bone, because Blender evaluates a bone of a hidden armature only if
+    driver reads each control bone, because Blender evaluates a bone of a hidden armature only if
     something visible depends on this bone.
 
     Args:
@@ -357,6 +359,11 @@ def _sides(points: NDArray[np.float64], height: float, size: float) -> tuple[flo
     """The x coordinate of a head's centre, and half the width of the head.
 
     Only vertices near the height of the eyes count, so that the shoulders are excluded.
+
+    Args:
+        points: float64[V, 3], vertices of all meshes in Blender units.
+        height: z of the eyes.
+        size: size of the face.
     """
     near = np.abs(points[:, 2] - height) < 0.1 * size
     # A face without skin near its eyes uses the width of the whole face.

@@ -93,7 +93,7 @@ def missing(controls: ArmatureObject, live: runtime.Runtime) -> list[str]:
 
 
 def leads(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
-    """Whether the face board leads a face, and not its sliders.
+    """Whether the face board leads a face, and not its sliders; False while controls are baked.
 
     Args:
         controls: the original (not evaluated) control armature.
@@ -104,7 +104,10 @@ def leads(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
 
 
 def leads_face(rig: ArmatureObject) -> bool:
-    """Whether the face board leads a face. Args: rig  its deforming armature."""
+    """Whether the face board leads a face; False while its controls are baked.
+
+    Args: rig  the deforming armature of the face.
+    """
     controls = parts.controls_of(rig)
     return controls is not None and leads(controls, runtime.of(rig))
 
@@ -198,7 +201,15 @@ def _read_moved(
     axes: Iterable[tuple[int, int]],
     gui: Floats,
 ) -> None:
-    """Read a handle that the user's constraints move. Args: axes  (index into places.at, axis)."""
+    """Read a handle that the user's constraints move.
+
+    Args:
+        seen: the control armature, evaluated or original.
+        bone: bone of the handle.
+        places: indices and ranges of the handle values.
+        axes: (index into places.at, axis) of each value of this handle.
+        gui: float32[G], values of the GUI controls; changed in place.
+    """
     local: Matrix = seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
     )
@@ -259,7 +270,8 @@ def put_raw(rig: ArmatureObject, values: Mapping[str, float]) -> board_fit.Loss:
 
     Args:
         rig: a character with a face board.
-        values: values by slider names; controls without a handle are set on their sliders.
+        values: wanted values by slider names; controls without a handle are set on their sliders.
+            Controls that are not named should keep their present values.
 
     Returns:
         The remaining differences of raw controls, which the board cannot reproduce.
@@ -288,7 +300,8 @@ def fit(
         live: the character's Runtime.
         raw: float[N, R], wanted values of raw controls at N frames.
         start: float[N, G], start of the search; None: the raw values converted by the rig's
-            raw_to_gui, or 0 if the DNA file has no table from GUI controls to raw controls.
+            raw_to_gui, or 0 if the table is not from the DNA file: for the primary board, or if the
+            file has no GUI controls.
 
     Returns:
         float64[N, G], values of GUI controls.

@@ -27,8 +27,8 @@ from . import armatures, board, bone_shapes, runtime
 
 COLLECTION = "Face Board"
 BORDER, FRAMES = runtime.BOARD_BONES
-_SHARE = 1.3  # height of the board divided by the size of the head
-_AWAY = 0.42  # distance from the head to the board divided by the size of the head
+_SHARE = 1.3  # height of a complete board / largest extent of the meshes and joints of the face
+_AWAY = 0.42  # distance from the face to a complete board / the same extent
 _SIDE_COLOURS = {"L": (0.25, 0.6, 1.0), "R": (1.0, 0.35, 0.3), "": (1.0, 0.8, 0.2)}
 _LINE_COLOUR = (0.8, 0.8, 0.82)
 _BORDER_COLOUR = (0.25, 0.75, 0.45)
@@ -126,6 +126,8 @@ def remove(context: Context, rig: ArmatureObject) -> int:
 def corners(controls: ArmatureObject) -> NDArray[np.float64]:
     """float64[N, 3] in world space: the corners of a face board's border.
 
+    If the border has no custom shape, its origin is the only point.
+
     Args:
         controls: control armature with the board.
     """
@@ -151,7 +153,8 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 def _sideways(live: runtime.Runtime) -> dict[int, float]:
     """GUI control -> joint motion along +x, divided by the length of the motion; -1 to 1.
 
-    The motion is summed over all joints; +x is the left side of the face. Only controls that move
+    The motion from rest to the control's highest value is summed over all joints; +x is the left
+    side of the face. Only controls that move
     the middle of the face sideways are included. Their names do not define the direction, because
     "left" in jawLeft may mean the viewer's left.
     """
@@ -193,7 +196,7 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
 def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
     """The position and unit of a primary board, which is beside the head meshes.
 
-    The primary board has about 30 handles, see primary_table.
+    The primary board has about 30 handles, which primary_table.py defines.
     """
     middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
     return _Place(Vector(middle), unit)
@@ -238,7 +241,15 @@ def _build(
     layout: Board,
     middle: Vector,
 ) -> None:
-    """Create bones in board units around the board's centre; the bone `board` scales them."""
+    """Create bones in board units around the board's centre; the bone `board` scales them.
+
+    Args:
+        edit_bones: edit bones of the control armature.
+        bars: the missing names of runtime.BOARD_BONES.
+        new: handles without a bone.
+        layout: the whole board.
+        middle: centre of the board, in the space of the armature.
+    """
     for name in bars:
         bone = edit_bones.new(name)
         head = middle + Vector((0.0, 0.3, 0.0)) if name == FRAMES else middle  # behind handles
@@ -265,7 +276,14 @@ def _build(
 
 
 def _dress(controls: ArmatureObject, layout: Board, names: Sequence[str], unit: float) -> None:
-    """Set shapes, colours, limits and locks of the new bones. Args: names  of these bones."""
+    """Set shapes, colours, limits and locks of the new bones.
+
+    Args:
+        controls: control armature with the bones.
+        layout: the whole board.
+        names: names of the new bones.
+        unit: Blender units per board unit, the scale of the bone `board`.
+    """
     name = controls.name.removesuffix("_controls")
     disc: bpy.types.Object | None = None
     for bone in controls.pose.bones:

@@ -195,7 +195,13 @@ def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:
 
 
 def _placed(bone: bpy.types.Bone, name: str, room: Room) -> tuple[float, Vector]:
-    """Scale of the outline in bone lengths, and its translation in the bone's space."""
+    """Scale of the outline in bone lengths, and its translation in the bone's space.
+
+    Args:
+        bone: the control bone.
+        name: name of the control bone.
+        room: extent of the face.
+    """
     # Bones of an extremely small or large face may have length 0; 1 avoids a division by 0.
     length, head = bone.length or 1.0, bone.head_local
     if name == "head":  # a ring above the hair

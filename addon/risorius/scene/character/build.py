@@ -32,7 +32,7 @@ class BuildOptions:
         textures: whether to load textures from the folders near the file and from texture_folder.
         texture_folder: folder to search first; "": none.
         simple_materials: whether to make materials without subsurface, relief and animated maps.
-        unit: metres per Blender unit; None: the scene's unit.
+        unit: metres per Blender unit; None or 0: the scene's unit.
         nearest_lods: whether to build the finest level of the DNA file if it has none of `lods`.
     """
 
@@ -90,7 +90,8 @@ def import_file(
         The deforming armature, and warnings as sentences.
 
     Raises:
-        DnaError: the file is damaged or cannot be read.
+        OSError: the file cannot be read.
+        DnaError: the file is damaged.
         PlanError, SpaceError: no character can be built from the file.
     """
     file = _read(path)
@@ -209,7 +210,7 @@ def _source(path: Path) -> str:
     """
     try:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
-    except ValueError:  # another drive
+    except ValueError:  # the files are on different drives
         return str(path)
 
 
@@ -279,9 +280,9 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
     Args:
         rig: the deforming armature.
-        mode: "AUTO": each mesh has one shape key with the final positions; "LIVE": one shape key
-            with the sum of the blend shape channels, which the armature then deforms; "KEYS": one
-            shape key for each blend shape channel.
+        mode: "LIVE": each mesh has one shape key with the sum of the blend shape channels, which
+            the armature then deforms; "AUTO": the same, but the shape key gets the final positions
+            if Direct mode is possible; "KEYS": one shape key for each blend shape channel.
 
     Returns:
         Sentences about meshes that could not be switched.

@@ -29,7 +29,7 @@ _DRIVEN = re.compile(r'^\["channels"\]\[(\d+)\]$')
 _KEY_VALUE = re.compile(r'^key_blocks\["(.*)"\]\.value$')
 _LIVE_MARK = "KEY_BSPLINE"  # interpolation that marks the live key
 
-Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
+Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, offsets [K, 3]
 
 
 # Session uids of mesh objects that were not edited since they were built, so that their skin
@@ -40,7 +40,8 @@ _fresh: set[int] = session.keep("meshes.fresh", set, ("undo", "load"))
 def fresh_weights(item: MeshObject) -> bool:
     """Whether a mesh was not edited since its import.
 
-    Its skin weights then equal the weights in the DNA file.
+    Its skin weights then equal the weights in the DNA file. False after undo and after a file was
+    opened, because edits made before are unknown.
     """
     return item.session_uid in _fresh
 
@@ -102,7 +103,13 @@ def build_mesh(
 
 
 def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-    """Add a vertex group with weights for each joint that the mesh uses."""
+    """Add a vertex group with weights for each joint that the mesh uses.
+
+    Args:
+        item: the mesh object.
+        mesh_plan: skin weights of the mesh.
+        labels: bone names by joint index.
+    """
     used = np.unique(mesh_plan.skin_joints)
     group_of = {int(j): item.vertex_groups.new(name=labels[int(j)]).index for j in used}
     edit = bmesh.new()
@@ -264,7 +271,8 @@ def edits_of(
         deltas: (vertex indices, float32[K, 3]) of the key's channel in the DNA file.
 
     Returns:
-        bool[V], whether a vertex was edited, and float64[V, 3] offsets, see user_edits.key_edits.
+        bool[V], whether a vertex was edited, and float64[V, 3], the offset of each edited vertex
+        from the unedited shape key; 0 elsewhere.
     """
     base = points_of(block.relative_key)
     return user_edits.key_edits(base, points_of(block), imported, user_edits.shaped(base, *deltas))

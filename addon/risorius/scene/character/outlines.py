@@ -49,8 +49,8 @@ def show(controls: ArmatureObject) -> None:
 def stand_beside(rig: ArmatureObject) -> int:
     """Place the outlines as on a newly imported face.
 
-    On faces that older versions of the add-on imported, the outlines cover the eyes. Sizes and
-    positions that the user changed are lost.
+    On faces that older versions of the add-on imported, the outlines cover the eyes. Hidden
+    outlines are shown. Sizes and positions that the user changed are lost.
 
     Args:
         rig: the character's deforming armature.

@@ -53,7 +53,7 @@ def _follows(rig: ArmatureObject) -> bool:
 
 
 def _is_at(rig: ArmatureObject, wanted: NDArray[np.float64]) -> bool:
-    """Whether a rig's object matrix equals a matrix, up to rounding. Args: wanted  float64[16]."""
+    """Whether a rig's object matrix equals a matrix up to rounding. Args: wanted  the matrix."""
     there = np.array(rig.matrix_basis).ravel()
     return bool(np.abs(there - wanted.ravel()).max() <= _NEAR * np.abs(wanted).max())
 
@@ -120,7 +120,8 @@ def find_bones(body: ArmatureObject) -> tuple[str, str, str]:
 
     Returns:
         (base, neck, head): bone names, "" if missing. The base is the parent of the neck, so that
-        the seam at the neck stays closed when the neck bends.
+        the seam at the neck stays closed when the neck bends. Without such a parent it is the neck
+        itself, or the head if there is no neck.
     """
     bones = list(body.data.bones)
     head = _named(bones, "head")
@@ -192,7 +193,7 @@ def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[s
 
 
 def body_of(controls: ArmatureObject) -> bpy.types.ChildOfConstraint | None:
-    """The constraint that attaches a face to a body, or None."""
+    """The constraint that attaches a face to a body; None if there is none or it has no target."""
     hold = controls.constraints.get(CONSTRAINT)
     if hold is None or hold.type != "CHILD_OF":
         return None

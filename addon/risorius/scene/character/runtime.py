@@ -44,7 +44,8 @@ class Runtime:
         owned: indices of the joints that the evaluator writes.
         rest: float64[J, 4, 4], world matrices of the neutral joints in Blender's units.
         anchors: joints of neck, head and eyes.
-        look: side "L" or "R" -> (index of a look control, yaw, pitch) in radians at value 1.
+        look: side "L" or "R" -> for each look control of this eye: (index of the raw control, yaw
+            and pitch of the eye in radians at value 1).
         lids: name such as eyeBlinkL or eyeWidenR -> index of the raw control.
         turning: joints whose rotation is stored in raw controls.
         morphs: cache, mesh index -> risorius.Morph.
@@ -123,7 +124,7 @@ class Runtime:
 
     @cached_property
     def handles(self) -> list[board_layout.Handle]:
-        """The handles of the face board. Their positions on a complete board are not set here."""
+        """The handles of the face board. Only the handles of a primary board have positions."""
         taken = (*CONTROL_BONES, *BOARD_BONES)
         if self.board == PRIMARY:
             return primary_table.handles_of(self.table, {}, taken)
@@ -155,8 +156,9 @@ class Turning:
         bone: the control bone that rotates the joint, "neck" or "head"; "": none.
         share: fraction of the control bone's rotation that the joint gets, 0 to 1.
         armature_axes: matrix that converts the vector part of a quaternion from the armature's
-            axes to the file's.
-        bone_axes: matrix that converts it from the axes of the joint's bone to the file's.
+            axes to the joint's axes in the file.
+        bone_axes: matrix that converts the vector part of a quaternion from the axes of the joint's
+            bone to the joint's axes in the file.
     """
 
     joint: int
@@ -231,7 +233,8 @@ def there(rig: ArmatureObject, board: str | None = None) -> Runtime:
     """The Runtime of a character; the caller must have checked that `of` gives one.
 
     Args:
-        rig, board: see `of`.
+        rig: the deforming armature.
+        board: PRIMARY or COMPLETE; None: the kind of the character's board.
     """
     live = of(rig, board)
     assert live is not None
@@ -285,7 +288,10 @@ def unit_of(rig: ArmatureObject) -> float:
 
 
 def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
-    """Drop compiled data of deleted characters. Args: rigs  deforming armatures that exist."""
+    """Drop compiled data of deleted characters, and forget the last written values of all.
+
+    Args: rigs  deforming armatures that exist.
+    """
     used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
     for key in [k for k in _cache if k[0] not in used]:
         del _cache[key]
@@ -386,6 +392,12 @@ def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> fl
     """The rotation of an eye by a look control at value 1, in radians.
 
     DEFAULT_EYE_ANGLE is returned if the eye rotates by less than 2 degrees or has no joint.
+
+    Args:
+        runtime: the Runtime of the character.
+        control: index of the look control.
+        side: "L" or "R".
+        horizontal: True: yaw; False: pitch.
     """
     joint = runtime.anchors.eyes.get(side)
     if joint is None:

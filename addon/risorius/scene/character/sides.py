@@ -28,7 +28,7 @@ _OTHER_BONE = {"eye_L": "eye_R", "eye_R": "eye_L"}
 def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
     """Slider name -> value, for a face or a region.
 
-    If the face board leads, the values come from the positions of its handles.
+    If the face board leads, its handles give the values of the sliders that they can move.
 
     Args:
         rig: the character.
@@ -44,14 +44,15 @@ def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
 
     Missing sliders, and sliders that a driver links to the other side, are ignored.
 
-    If a face board leads, its handles are moved to the nearest pose instead.
+    If a face board leads, its handles are moved to the nearest pose instead. Then the other sliders
+    are set without limits, linked ones too.
 
     Args:
         rig: the character.
         values: values by slider names.
 
     Returns:
-        The number of sliders that were set.
+        The number of sliders that were set or passed to the board.
     """
     face, controls, live = parts.face_bone(rig), parts.controls_there(rig), runtime.there(rig)
     assert face is not None
@@ -146,7 +147,7 @@ def copy_across(rig: ArmatureObject, from_left: bool, region: str = "") -> int:
         region: name of the region to copy; "": all regions.
 
     Returns:
-        The number of sliders that were set.
+        The number of sliders that were set or passed to the board.
     """
     values = values_of(rig, region)
     return put(rig, slider_rows.across_from(values, native.regions(), from_left))

@@ -18,7 +18,7 @@ from ..character import board, runtime
 from . import kept_points, sliders
 from .skin import Point, Skin
 
-COUNT = 18  # handles of a face
+COUNT = 18  # number of handles of a face
 _SHARE = 0.1  # least motion of a handle by a slider, divided by the motion of its strongest slider
 _placed: WeakKeyDictionary[native.Surface, list[Point]] = session.keep(
     "handles.placed", WeakKeyDictionary, ("unregister",)
@@ -44,14 +44,19 @@ def offered(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
 
     Args:
         rig: the character.
-        surface: see `of`.
+        surface: surface of the visible level of detail.
     """
     hidden = kept_points.of(rig, kept_points.HIDDEN, surface.vertex_counts)
     return [point for point in of(surface) if point not in hidden]
 
 
 def selected(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
-    """The handles that are selected and not hidden. Args: rig, surface  see `offered`."""
+    """The handles that are selected and not hidden.
+
+    Args:
+        rig: the character.
+        surface: surface of the visible level of detail.
+    """
     chosen = kept_points.of(rig, kept_points.SELECTED, surface.vertex_counts)
     return [point for point in offered(rig, surface) if point in chosen]
 

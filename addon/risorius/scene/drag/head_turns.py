@@ -20,14 +20,14 @@ from ..skinning import conditions, direct
 
 Float = NDArray[np.float64]
 
-_STRAIGHT = np.eye(4)  # no motion
-_LAST = (0.0, 0.0, 0.0, 1.0)  # row of an affine matrix
+_STRAIGHT = np.eye(4)  # matrix without motion
+_LAST = (0.0, 0.0, 0.0, 1.0)  # last row of an affine matrix
 
 
 class HeadTurns:
     """Head and joint motions that the raw controls do not contain, at one moment.
 
-    It refers to Blender objects, so it must not outlive the operator that creates it.
+    The instance refers to Blender objects, so it must not outlive the operator that creates it.
     """
 
     def __init__(

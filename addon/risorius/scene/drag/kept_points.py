@@ -54,7 +54,7 @@ def toggle(rig: ArmatureObject, kind: str, point: Point, counts: list[int]) -> b
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
         point: the point to add or remove.
-        counts: see `of`.
+        counts: number of vertices of each DNA mesh.
 
     Returns:
         True if the point was added, False if it was removed.

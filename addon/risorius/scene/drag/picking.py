@@ -25,8 +25,8 @@ from . import handles
 from .head_turns import HeadTurns
 from .skin import Point, Skin
 
-_FAR = 0.05  # of the face's size: a hit farther from all vertices does not count as this face
-NEAR = 0.06  # of the face's size: a handle farther from the hit surface counts as occluded
+_FAR = 0.05  # largest distance of a hit from the nearest vertex / size of the face
+NEAR = 0.06  # largest distance of an unoccluded handle from the hit / size of the face
 _THROUGH = 16  # largest number of wire or bounds objects that a ray passes
 
 
@@ -48,7 +48,10 @@ class Hit:
 
 
 def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
-    """The vertex at which a ray meets a face; None if it first meets another object or nothing.
+    """The vertex of a face that is nearest to the place where a ray meets the face.
+
+    None if the ray meets nothing, or first another object, an instance of a face, a mesh of another
+    level of detail, or a place far from all vertices.
 
     Args:
         context: its evaluated scene is searched.
@@ -78,7 +81,8 @@ def _first(
 ) -> tuple[bpy.types.Object, Vector, int, Matrix] | None:
     """The first object that a ray meets, except objects drawn as wire or bounds.
 
-    Returns: (original object, location in world space, index of the polygon, world matrix).
+    Returns: (original object, location in world space, index of the polygon, world matrix); None if
+    the ray meets nothing else or more than _THROUGH such objects.
     """
     depsgraph = context.evaluated_depsgraph_get()
     for _ in range(_THROUGH):
@@ -102,7 +106,17 @@ def _nearest(
     place: NDArray[np.float64],
     index: int,
 ) -> Hit | None:
-    """The vertex of a face's mesh nearest to the hit of a ray; None if it is too far away."""
+    """The vertex of a face's mesh nearest to the hit of a ray.
+
+    None if the vertex is too far away, or if the mesh belongs to another level of detail.
+
+    Args:
+        context: has the visible scene.
+        rig, live: the character and its Runtime.
+        item: the mesh object.
+        place: float64[3], the hit in world space.
+        index: index of the polygon that was hit.
+    """
     mesh, skin = int(item[parts.MESH]), Skin.of(context, rig, live)
     if mesh not in skin.surface.mesh_indices:
         return None

@@ -21,20 +21,21 @@ from ..lod import lods
 Float = NDArray[np.float64]
 Point = tuple[int, int]  # index of a mesh in the DNA file, index of its vertex
 
-_BESIDE = 0.02  # of the face's size: largest distance of a vertex from the mirrored position
+_BESIDE = 0.02  # largest distance of a vertex from the mirrored position / size of the face
 
 
 @dataclass
 class Skin:
     """A face's meshes in the scene.
 
-    It refers to Blender objects, so it must not outlive the operator that creates it.
+    A Skin refers to Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
         surface: the face in file space (axes and unit of the DNA file), at the visible level of
             detail.
         items: mesh index -> mesh object.
-        size: largest extent of the neutral face, in Blender units.
+        size: largest extent of the level's first neutral mesh, in Blender units; below it is called
+            the size of the face.
         depsgraph: dependency graph of the view.
         live: Runtime of the character.
         pressed: float64[3], world position of the dragged vertex at the mouse press, or None.
@@ -49,7 +50,7 @@ class Skin:
 
     @classmethod
     def of(cls, context: Context, rig: ArmatureObject, live: runtime.Runtime) -> Skin:
-        """Collect the visible meshes of a character.
+        """The Skin of a character, at the level of detail that the viewport shows.
 
         Args:
             context: has the visible scene.
@@ -75,7 +76,8 @@ class Skin:
     def seen(self, mesh: int) -> Float | None:
         """float64[V, 3]: evaluated vertices of a mesh in world space.
 
-        None if the mesh is hidden or in edit mode, or a modifier changes its vertex count.
+        None if the mesh is hidden or in edit mode, or if its vertex count differs from the DNA file
+        before or after the modifiers.
 
         Args:
             mesh: index of the mesh in the DNA file.
@@ -88,14 +90,20 @@ class Skin:
         return flat.reshape(-1, 3).astype(np.float64) @ place[:3, :3].T + place[:3, 3]
 
     def seen_at(self, point: Point) -> Float | None:
-        """float64[3]: one vertex of the result of `seen`, or None. Args: point  mesh and vertex."""
+        """float64[3]: one evaluated vertex in world space; None in the same cases as `seen`.
+
+        Args:
+            point: index of the mesh in the DNA file, and vertex.
+        """
         data, place = self._evaluated(point[0])
         if data is None:
             return None
         return place[:3, :3] @ np.array(data.vertices[point[1]].co, np.float64) + place[:3, 3]
 
     def corners(self, mesh: int, polygon: int) -> list[tuple[int, Float]] | None:
-        """(vertex, position in world space) of a polygon's vertices; None if `seen` gives None.
+        """(vertex, position in world space) of a polygon's vertices.
+
+        None if `seen` gives None or there is no such polygon.
 
         Args:
             mesh: index of the mesh in the DNA file.

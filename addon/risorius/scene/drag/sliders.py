@@ -35,7 +35,8 @@ class Sliders:
         start: float64[R], values of the sliders; if the face board leads, the values that the
             board gives them.
         seen: float32[R], the raw controls of the face, with layers and eye bones.
-        gain: float64[R], change of a raw control divided by the change of its slider.
+        gain: float64[R], change of a raw control divided by the change of its slider; 1 if this
+            is too small for a drag.
         free: bool[R], sliders that can move.
         low, high: float64[R], the limits of `seen`.
         linked: (index of a slider, index of the slider on the other side that follows it).
@@ -134,7 +135,14 @@ def write(
 def _write_board(
     rig: ArmatureObject, live: runtime.Runtime, sliders: Sliders, raw: NDArray[np.float32]
 ) -> list[str]:
-    """`write` for a leading face board: its handles move from their start to the nearest pose."""
+    """`write` for a leading face board: its handles move from their start to the nearest pose.
+
+    Args:
+        rig: the character.
+        live: Runtime of the character.
+        sliders: sliders at the start of the drag.
+        raw: float32[R], wanted raw controls.
+    """
     board.put_places(parts.controls_there(rig), live, sliders.places)
     values = sliders.values(raw)
     moved = {
@@ -165,7 +173,12 @@ def mirrored_indices(live: runtime.Runtime) -> NDArray[np.int64]:
 
 
 def of_region(live: runtime.Runtime, region: str) -> NDArray[np.bool_]:
-    """bool[R]: whether a raw control is in a region. Args: live  Runtime, region  name."""
+    """bool[R]: whether a raw control is in a region.
+
+    Args:
+        live: Runtime of the character.
+        region: name of the region.
+    """
     of_slider = native.regions().of_slider
     return np.array([of_slider(label) == region for label in live.labels], bool)
 
@@ -182,6 +195,13 @@ def _gains(
 
     Each slider is changed alone, because layers can suppress one of two opposite controls, such as
     looking left and right.
+
+    Args:
+        seen: the evaluated control armature.
+        live: Runtime of the character.
+        depsgraph: graph in which the controls were evaluated.
+        maximum: largest value of a slider.
+        start: float64[R], values of the sliders.
     """
     gain = np.ones(len(start))
     if not layers.has_any(seen.original):

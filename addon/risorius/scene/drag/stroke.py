@@ -30,8 +30,8 @@ from .skin import Point, Skin
 
 Float = NDArray[np.float64]
 
-_STILL = 1e-6  # of the face's size: smaller motions of a point by a control are ignored
-_SMALL = 0.02  # of the largest change of a control: smaller changes are not keyed
+_STILL = 1e-6  # least motion of a point by a control at value 1 / size of the face
+_SMALL = 0.02  # least change of a control that is kept / largest change of a control
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,11 @@ class Options:
     Attributes:
         symmetric: move the mirrored point too.
         method: "near": few sliders that mainly move the dragged area; "least_squares": all sliders;
-            or "transpose", see solve_drag.
+            or "transpose": all sliders, in proportion to their effect on the points.
         single: move only the best control; with `symmetric` also its partner on the other side.
         choice: with `single`: 0: the best control, 1: the second best, and so on.
-        region: use only controls of the region of the point.
+        region: use only controls of one region: the region of the control that moves the dragged
+            point most.
         others: points that move together with the dragged point.
     """
 
@@ -79,7 +80,7 @@ class _Anchors:
 class Stroke:
     """A running drag. `begin` makes it; `finish` or `restore` ends it.
 
-    It refers to Blender objects, so it must not outlive the operator that creates it.
+    A Stroke refers to Blender objects, so it must not outlive the operator that creates it.
 
     Attributes:
         rig, live: the character and its Runtime.
@@ -104,9 +105,10 @@ class Stroke:
     raw: NDArray[np.float32]
     best: list[tuple[int, float, float]] = field(default_factory=list)
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)
-    _was: NDArray[np.float32] | None = None  # [V, 3], dragged mesh at the press in file space
+    _was: NDArray[np.float32] | None = None  # [V, 3], dragged mesh at press, file space
     _eases: dict[tuple[Point, ...], Float] = field(default_factory=dict)
-    _apart: Float = field(default_factory=lambda: np.zeros(3))  # seen minus predicted, world space
+    # float64[3]: seen minus predicted position of the point, in world space.
+    _apart: Float = field(default_factory=lambda: np.zeros(3))
 
     @property
     def start(self) -> Float:
@@ -115,7 +117,7 @@ class Stroke:
 
     @property
     def dragged_region(self) -> str:
-        """The region of the control that moves the point most."""
+        """The region of the control that moves the point most, of those that the drag may move."""
         strongest = int(np.argmax(np.linalg.norm(self.reach, axis=0) * self.state.free))
         return native.regions().of_slider(self.live.labels[strongest])
 
@@ -129,6 +131,10 @@ class Stroke:
 
         Returns:
             float64[3]: the reached position in world space.
+
+        Raises:
+            FaceError: the face is a library override that Blender does not allow to change; the
+                sliders are then restored.
         """
         self.raw, predicted = self._solve(target - self._apart, view, self._free(target, view))
         sliders.write(self.rig, self.live, self.state, self.raw)
@@ -137,16 +143,21 @@ class Stroke:
         return at
 
     def finish(self, context: Context, target: Float, view: Float | None = None) -> list[str]:
-        """Move the point to its target, and insert keys.
+        """Move the point to its target, and insert keys if auto-key or a tweak is on.
 
         Controls that changed very little during the drag are reset to their values before the drag.
 
         Args:
             context: has the settings for keys.
-            target, view: see `to`.
+            target: float64[3], wanted position in world space.
+            view: float64[3], a direction along which the position is free; None: no free direction.
 
         Returns:
             The names of the moved sliders.
+
+        Raises:
+            FaceError: as by `to`, or an active tweak does not include the current frame. The
+                controls then have their values from before the drag.
         """
         self.to(context, target, view)
         change = np.abs(self.raw - self.state.seen)
@@ -180,7 +191,10 @@ class Stroke:
         self.skin.show(context)
 
     def moved(self, count: int = 3) -> list[tuple[str, float]]:
-        """(name, change since the press) of the `count` controls that changed most."""
+        """(name, change since the press) of the `count` controls that changed most.
+
+        Controls that changed by 0.001 or less are left out.
+        """
         change = (self.raw - self.state.seen).astype(np.float64)
         order = np.argsort(-np.abs(change), kind="stable")[:count]
         return [(self.live.labels[i], float(change[i])) for i in order if abs(change[i]) > 1e-3]
@@ -255,6 +269,11 @@ class Stroke:
 
         The solver measures the error of a point along its three axes; the length of an axis is the
         weight of the error along this axis.
+
+        Args:
+            anchors: the points of the drag.
+            target: float64[3], wanted position of the dragged point in world space.
+            view: float64[3], a direction along which the position is free; None: no free direction.
         """
         goal, axes = anchors.rest.copy(), np.tile(np.eye(3), (len(anchors.points), 1, 1))
         shift = np.linalg.solve(anchors.maps[0], target - anchors.world[0])
@@ -286,8 +305,8 @@ class Stroke:
         return list(known.rules_of(index)[1])
 
     def _ease(self) -> Float:
-        """float64[R]: weights of the controls, larger for controls that move mainly the dragged
-        points, see local_ease."""
+        """float64[R]: weights of the controls, up to 1, larger for controls that move mainly the
+        dragged points."""
         surface, key = self.skin.surface, self.options.others
         if key not in self._eases:
             low, high = self.state.low, self.state.high
@@ -310,7 +329,7 @@ class Stroke:
         points = [self.point, *others]
         mirrored = [False] * len(points)
         for point in (self.point, *others) if symmetric else ():
-            other = self.skin.mirrored(point)  # itself for a point on the middle line
+            other = self.skin.mirrored(point)  # the point itself if it is on the middle line
             if other is not None and (other == point or other not in points):
                 points.append(other)
                 mirrored.append(True)

@@ -45,8 +45,8 @@ class _Work:
 
 
 _work = session.keep("handlers.work", _Work, ("unregister",))
-# Session uids of known objects, of known control armatures, and of deforming armatures that were
-# repaired since the last update.
+# Session uids. _objects: known objects of the file; empty after load and undo. _faces: known
+# control armatures. _mended: deforming armatures that were repaired since the last update.
 _objects = session.value("handlers.objects", frozenset[int](), ("undo", "load"))
 _faces = session.value("handlers.faces", frozenset[int](), ("unregister",))
 _mended: set[int] = session.keep("handlers.mended", set, ("load",))
@@ -106,7 +106,7 @@ def _render_ended(*_arguments: object) -> None:
 
 @persistent
 def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
-    """React to edits. Tag no control armature, because that would trigger this handler again."""
+    """React to edits. A control armature is tagged only after a repair: tags call this again."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     joint_readings.note_edit()
@@ -162,7 +162,7 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     known = _objects.now
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)
-    come = bool(known)  # empty after load and undo, when no object counts as new
+    come = bool(known)  # `known` is empty after load and undo: nothing is new
     if new or len(bpy.data.objects) != len(known):
         _objects.now = frozenset(item.session_uid for item in bpy.data.objects)
         runtime.forget_unused(parts.rigs())
@@ -196,9 +196,11 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters to evaluate, because their controls, their body or the camera was updated.
+    """The characters to evaluate after an update; edits are also recorded for layers and tweaks.
 
-    The body of a character is the armature to which its face is attached.
+    Of such a character, the control armature, the body (the armature to which the face is attached)
+    or an action of a layer was updated; or the deforming armature was updated, and was moved or has
+    joints that something reads; or the camera was updated, and chooses the level of detail.
     """
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
@@ -217,7 +219,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
                 armatures.add(item)
             camera_moved |= camera is not None and item == camera.original
     if bones_edited:
-        last_written.forget()  # includes the cached rest pose of the bones
+        last_written.forget()  # this also forgets the cached rest pose of the bones
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)
@@ -228,7 +230,13 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
 def _note_keys(
     frame: float, armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
 ) -> None:
-    """Tell shown_keys and tweak_guard that Blender's operators may have set keys or moved bones."""
+    """Show keys, and move keys into tweaks, that Blender's operators may have just set.
+
+    Args:
+        frame: current frame of the scene.
+        armatures: edited armature objects.
+        actions: edited actions.
+    """
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         data = controls.animation_data if controls is not None else None

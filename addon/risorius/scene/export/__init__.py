@@ -1,2 +1,3 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exports animation and plain materials for other programs: glTF, FBX, USD, Alembic."""
+"""Exports a face for other programs (glTF, FBX, USD, Alembic): animation and plain materials; and
+for browsers, as a web page."""

@@ -55,7 +55,7 @@ class ShipOptions:
 def sampled(
     context: Context, rigs: Sequence[ArmatureObject], options: ShipOptions
 ) -> Generator[float, None, list[tuple[ArmatureObject, int, sampling.Samples]]]:
-    """Sample characters for `copies` or `clip`; a generator like sampling.sample.
+    """Sample characters for an export; a generator that yields progress and can be cancelled.
 
     Args:
         context: scene and view layer to sample.
@@ -71,7 +71,7 @@ def sampled(
     Raises:
         BakeError: a character is baked, so that its controls do not give its animation, or the
             level was not built.
-        ValueError: the range has no frame.
+        ValueError: the range ends before it starts, or the step is not above 0.
     """
     for rig in rigs:
         if bake_face.baked(rig) == bake_face.RESULT:
@@ -108,7 +108,8 @@ def copies(
     with evaluate.paused():
         try:
             stage = _stage(user, characters[0][2].frames)
-            loans.take("scenes", stage, _name(characters[0][0]))  # some formats name takes by it
+            # Some formats name the animation (the take) after the scene.
+            loans.take("scenes", stage, _name(characters[0][0]))
             for rig, level, samples in characters:
                 _copy(stage, rig, level, samples, options, loans)
             layer = stage.view_layers[0]
@@ -149,7 +150,16 @@ def _copy(
     options: ShipOptions,
     loans: Loans,
 ) -> None:
-    """Copy one character: armature, meshes of the exported levels, and their baked actions."""
+    """Copy one character: armature, meshes of the exported levels, and their baked actions.
+
+    Args:
+        stage: the temporary scene.
+        rig: deforming armature of the character.
+        level: level of detail.
+        samples: inputs of the face.
+        options: options of the export.
+        loans: names for the copies.
+    """
     live = runtime.there(rig)
     pose = baked_tracks.evaluate(live, samples, level)
     copy = rig.copy()
@@ -238,6 +248,14 @@ def _shapes(
     """Give a copied mesh a shape key with baked animation for each exported blend shape channel.
 
     Other shape keys that Risorius made are removed from the copy.
+
+    Args:
+        made: the copied mesh object.
+        item: the original mesh object.
+        live: Runtime of the character.
+        samples: inputs of the face.
+        weights: float32[N, C], weights of the blend shape channels at N frames.
+        options: options of the export.
     """
     key = made.data.shape_keys
     if key is None:
@@ -318,7 +336,8 @@ def clip(
         maps: add the values of the animated maps, by their names in the DNA.
 
     Returns:
-        A clip with names of the DNA file (Blender's name if a name occurs twice in the file).
+        A clip with names of the DNA file for controls and maps, and names such as "head.yaw". A
+        control whose name occurred before in the file has Blender's name.
     """
     live, names = runtime.there(rig), []
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):

@@ -26,7 +26,7 @@ _drawing = session.value("ordinary_form.drawing", cast("object", None), ("quit",
 
 
 def begin(reader: str) -> None:
-    """Keep all faces out of Direct mode until `end` is called.
+    """Keep all faces out of Direct mode until `end` is called; a timer calls `end` for GLTF.
 
     Args:
         reader: DIALOG or GLTF; a second call for the same reader has no effect.
@@ -44,7 +44,7 @@ def begin(reader: str) -> None:
 
 
 def end(reader: str) -> None:
-    """Allow Direct mode again. Args: reader  see `begin`."""
+    """Let faces use Direct mode again. Args: reader  the DIALOG or GLTF of the call of `begin`."""
     names = _held.pop(reader, None)
     if names is None:
         return

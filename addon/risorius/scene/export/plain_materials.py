@@ -48,7 +48,7 @@ class _Flat:
         name: name of the user's material before the export.
         work: a copy for baking; None if the material has no nodes.
         users: (mesh object, slot number) with this material.
-        shader: the shader node of the copy; None for a transparent film.
+        shader: the shader node of the copy; None for a transparent film or without nodes.
         clear: True: the material is transparent in places.
         sources: input "color", "alpha" or "roughness" -> shader_inputs.Source.
         images: input -> reused or baked image, including "normal".
@@ -75,13 +75,14 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
     Args:
         override: context override of the export, from export_animation.copies.
         loans: lent_names.Loans for the names of the materials.
-        size: width and height of baked images in pixels.
+        size: width and height of baked images in pixels; images of roughness alone are smaller.
 
     Yields:
         The progress, 0 to 1.
 
     Raises:
-        FaceError: Cycles is missing, or a mesh already has the maximum of eight UV maps.
+        FaceError: Cycles is missing, a mesh already has the maximum of eight UV maps, or the file
+            of a reused image is missing.
     """
     items = [o for o in override["scene"].objects if o.type == "MESH"]
     for item in items:
@@ -213,6 +214,11 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
     """Write UV coordinates of some corners into the UV map for baking.
 
     A missing UV map for baking is created as a copy of the UV map that is active for rendering.
+
+    Args:
+        mesh: the copied mesh.
+        corners: int64[n], indices of the corners.
+        part: float32[n, 2], their UV coordinates.
     """
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)
@@ -231,7 +237,7 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
 def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
     """Copy the coordinates of the UV map for baking into the UV map that is active for rendering.
 
-    The UV map for baking is then removed.
+    The UV map for baking is then removed. If it is the only UV map, it stays as "UVMap" instead.
     """
     layer, shown = mesh.uv_layers.get(_LAYER), _shown_layer(mesh)
     if layer is None:
@@ -251,7 +257,14 @@ def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
 def _bake(
     override: Override, items: Sequence[MeshObject], flats: Sequence[_Flat], size: int
 ) -> Iterator[float]:
-    """Bake all materials: first colours, then opacity and roughness together. Yields progress."""
+    """Bake all materials: first colours, then opacity and roughness together. Yields progress.
+
+    Args:
+        override: context override of the export.
+        items: the copied meshes.
+        flats: their materials.
+        size: width and height of baked images in pixels; images of roughness alone are smaller.
+    """
     _prepare(override["scene"], size)
     spare = bpy.data.images.new("Spare", 4, 4)
     jobs = [
@@ -299,7 +312,13 @@ def _shown_on(item: MeshObject, flats: Iterable[_Flat]) -> list[_Flat]:
 
 
 def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
-    """An empty image for a bake. It is smaller if it stores roughness without opacity."""
+    """An empty image for a bake. It is smaller if it stores roughness without opacity.
+
+    Args:
+        flat: the material.
+        name: "color", or "alpha" for the image with opacity and roughness.
+        size: width and height in pixels.
+    """
     if name != "color" and "alpha" not in flat.baked:
         size = 64 if flat.mean else max(size // 4, 64)
     image = bpy.data.images.new(f"{flat.name}_{name}", size, size, alpha=True)
@@ -358,7 +377,13 @@ def _bake_one(override: Override, items: Iterable[MeshObject], item: MeshObject)
 
 
 def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Image | None) -> None:
-    """Store baked images in a material: colour with opacity, and roughness as image or number."""
+    """Store baked images in a material: colour with opacity, and roughness as image or number.
+
+    Args:
+        flat: the material.
+        color: baked image of the colour, or None.
+        masks: baked image with opacity in red and roughness in green, or None.
+    """
     values = _pixels(masks) if masks is not None else np.zeros((0, 0, 4), np.float32)
     if color is not None:
         _finish_color(color, values[..., 0] if "alpha" in flat.baked else None)

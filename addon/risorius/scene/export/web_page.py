@@ -21,8 +21,8 @@ class Sound:
 
     Attributes:
         path: path of the sound file.
-        offset: seconds from the first exported frame to the start of the strip; below 0 if the
-            strip starts earlier.
+        offset: seconds from the first exported frame to the frame at which the untrimmed sound file
+            begins; below 0 if the file begins earlier.
     """
 
     path: Path
@@ -31,6 +31,8 @@ class Sound:
 
 def first_sound(scene: bpy.types.Scene, start: float, end: float, rate: float) -> Sound | None:
     """The first audible sound strip in a range of frames, or None.
+
+    Strips without a file, and with files of formats that a page cannot play, are left out.
 
     Args:
         scene: has the sequencer.

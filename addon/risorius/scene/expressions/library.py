@@ -26,7 +26,7 @@ RISORIUS, LIBRARY, FILE = "RISORIUS", "LIBRARY", "FILE"
 MARK = "risorius_expression"  # on an action and its asset: the text of the expression
 _FAVOURITES = "favourites.txt"
 _MOST = 2000  # largest number of files that are read from a library
-_AT_ONCE = 100  # expressions that are written together, all or none
+_AT_ONCE = 100  # number of expressions that are written together, all or none
 
 
 class LibraryError(FaceError):
@@ -100,6 +100,8 @@ def all_items(where: Path) -> tuple[dict[str, Item], list[str]]:
 
 def of_folder(where: Path) -> tuple[list[tuple[Path, native.Expression]], list[str]]:
     """(path, expression) pairs of a library, and a sentence for each unusable file.
+
+    Only the first _MOST files in the order of their names are read.
 
     Args:
         where: the folder; a missing folder gives no expressions and one sentence.
@@ -300,7 +302,7 @@ def remove(item: Item) -> None:
         item: an expression of the grid.
 
     Raises:
-        LibraryError: the expression may not be changed, see check_own.
+        LibraryError: the expression belongs to Risorius, or its file has several expressions.
         OSError: its file cannot be removed.
     """
     check_own(item)

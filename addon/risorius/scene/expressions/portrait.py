@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SIZE = 160  # width and height of a picture in pixels
-VERSION = 1  # of the drawing code; cached pictures of other versions are not used
+VERSION = 1  # version of the drawing code; cached pictures of other versions are not used
 _SMOOTH = 2  # samples per pixel in each direction
 _KEY = np.array([-0.45, 0.55, 0.70])  # direction to the key light at the upper left
 _FILL = np.array([0.75, 0.05, 0.65])  # direction to the fill light
@@ -118,7 +118,8 @@ def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
     """float64[V, 3] for each piece: its posed vertices in file space.
 
     Args:
-        sitter, sliders: see draw.
+        sitter: the face.
+        sliders: values by property name; other sliders are at rest.
     """
     live = sitter.live
     rests = dict(zip(live.labels, live.rests, strict=True))
@@ -129,11 +130,15 @@ def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
 
 
 def draw_places(sitter: Sitter, placed: Sequence[Floats], size: int = SIZE) -> Floats:
-    """Draw a face like `draw`, with given vertices.
+    """Draw a face with given vertices, seen from the front.
 
     Args:
-        sitter, size: see draw.
+        sitter: the face.
         placed: vertices of each piece, from `places`.
+        size: width and height in pixels.
+
+    Returns:
+        float64[size, size, 3] in [0, 1], row 0 at the bottom.
     """
     view, scale = _frame(sitter)
     high = size * _SMOOTH
@@ -187,7 +192,14 @@ def _moves(live: runtime.Runtime, deltas: Floats) -> Floats:
 def _posed(
     live: runtime.Runtime, piece: Piece, moves: Floats, channels: NDArray[np.float32]
 ) -> Floats:
-    """float64[V, 3]: vertices of a mesh after blend shapes and skinning, in file space."""
+    """float64[V, 3]: vertices of a mesh after blend shapes and skinning, in file space.
+
+    Args:
+        live: Runtime of the character.
+        piece: the mesh.
+        moves: float64[J, 4, 4], skinning matrices of the joints.
+        channels: float32[C], weights of the blend shape channels.
+    """
     points = np.asarray(live.dna.meshes[piece.index].positions, np.float64).copy()
     for channel, vertices, deltas in piece.shapes:
         if channel < len(channels) and channels[channel]:
@@ -215,7 +227,13 @@ def _frame(sitter: Sitter) -> tuple[Floats, float]:
 
 
 def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats:
-    """float64[V, 3]: pixels to the right, pixels down, and depth towards the viewer in pixels."""
+    """float64[V, 3]: pixels to the right, pixels down, and depth towards the viewer in pixels.
+
+    Args:
+        points: float64[V, 3] in Blender's axes.
+        middle, half: the centre of the picture and half its height, in the unit of `points`.
+        high: height and width of the picture in samples.
+    """
     seen = (points - middle)[:, [0, 2, 1]] / half
     seen[:, 2] *= -1.0  # the face looks along -y
     seen[:, :2] *= (_FAR / (_FAR - seen[:, 2]).clip(1.0))[:, None]
@@ -237,7 +255,12 @@ class _Picture:
         self.shade = native.part("plot.drawing.shade")
 
     def add(self, piece: Piece, screen: Floats) -> None:
-        """Draw a mesh over the picture. Args: screen float64[V, 3], see _on_screen."""
+        """Draw a mesh over the picture.
+
+        Args:
+            piece: the mesh.
+            screen: float64[V, 3] in pixels: to the right, down, and depth towards the viewer.
+        """
         normals = self.shade.vertex_normals(screen * [1.0, -1.0, 1.0], piece.triangles)
         kept = _in_sight(screen[piece.triangles], self.high)
         triangles = piece.triangles[kept]
@@ -286,8 +309,12 @@ class _Picture:
 
 
 def _in_sight(corners: Floats, high: int) -> Ints:
-    """Indices of the finite triangles that may overlap the picture. Args: corners  float64[F, 3, 3]
-    in pixels; high  height of the picture."""
+    """Indices of the finite triangles that may overlap the picture.
+
+    Args:
+        corners: float64[F, 3, 3] in pixels, the corners of the triangles.
+        high: height of the picture in pixels.
+    """
     low, top = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
     inside = (top >= 0).all(axis=1) & (low <= high - 1).all(axis=1)
     return np.flatnonzero(inside & np.isfinite(corners).all(axis=(1, 2)))

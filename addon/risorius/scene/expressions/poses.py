@@ -96,7 +96,7 @@ def apply(
         present: values to start from; None: the current values.
 
     Returns:
-        The property names of the sliders that were set.
+        The property names of the sliders that the blend sets, also of linked sliders, which stay.
 
     Raises:
         LibraryError: the expression was made for another rig; nothing was moved.
@@ -144,7 +144,9 @@ def captured(
 
 
 def held_by(expression: native.Expression, weights: Iterable[str]) -> set[str]:
-    """The regions of an expression; a viseme always has the whole mouth.
+    """The regions that an expression names; if it names none, the regions of its sliders.
+
+    A viseme that names none also has mouth, jaw and tongue.
 
     Args:
         expression: the expression.

@@ -25,7 +25,7 @@ from ..base.blender_types import ArmatureObject
 from ..character import runtime
 from . import library, portrait
 
-_MOST_FACES = 5000  # polygons of a drawn mesh, if a level of detail has so few
+_MOST_FACES = 5000  # most polygons of a drawn mesh, if one of its levels of detail has no more
 _TEXELS = 640  # largest width and height of a reduced image in pixels
 _MOST_FILES = 3000  # number of cached pictures; the oldest are removed
 _DIM = {"teeth": 0.9, "tongue": 0.75, "gum": 0.7}  # factor on colours in the shaded mouth
@@ -205,7 +205,7 @@ def _pixels(
             held = np.empty(width * height * 4, np.float32)
             floats: Any = copy.pixels
             floats.foreach_get(held)
-        except (RuntimeError, TypeError):  # its file is missing
+        except (RuntimeError, TypeError):  # the file of the image is missing
             return None
         finally:
             bpy.data.images.remove(copy)

@@ -47,8 +47,8 @@ def export(
         options: kinds of edits to write; None: all.
 
     Returns:
-        The bytes, and sentences about the changes with their sizes. Without edits the bytes equal
-        the imported file.
+        The bytes, and sentences about the changes with their sizes, which are also written to a
+        Text and to the console. Without edits the bytes equal the imported file.
 
     Raises:
         ExportError: the polygons of a mesh differ from the DNA file, a mesh is in edit mode, or the
@@ -152,7 +152,13 @@ class _Job:
         )
 
     def mesh(self, item: MeshObject, mesh_plan: plans.MeshPlan, options: ExportOptions) -> None:
-        """Write edits of the neutral vertices and the shape keys of a mesh."""
+        """Write edits of the neutral vertices and the shape keys of a mesh.
+
+        Args:
+            item: the mesh object.
+            mesh_plan: the mesh in the imported file.
+            options: kinds of edits to write.
+        """
         shape = refit_meshes.read_shape(self._live, item, mesh_plan, known=True)
         dna_mesh = self._dna.meshes[mesh_plan.index]
         name = self._dna.mesh_names[mesh_plan.index]
@@ -181,7 +187,10 @@ class _Job:
             if block.mute or block.vertex_group:
                 self.report.append(
                     told(
-                        "{name}: the mute or mask of the key {key} is not written.",
+                        (
+                            "{name}: the muting or the vertex group of the shape key {key} "
+                            "is not written."
+                        ),
                         name=name,
                         key=key,
                     )
@@ -190,7 +199,13 @@ class _Job:
     def _neutral(
         self, dna_mesh: native.Mesh, shape: refit_meshes.Shape, mesh_plan: plans.MeshPlan
     ) -> None:
-        """Write the neutral coordinates that differ from the import; others stay bit-identical."""
+        """Write the neutral coordinates that differ from the import; others stay bit-identical.
+
+        Args:
+            dna_mesh: the mesh of the Dna to write; changed.
+            shape: positions of the mesh object with the user's edits.
+            mesh_plan: the mesh in the imported file.
+        """
         moved = user_edits.changed(shape.points, mesh_plan.positions)
         # Blender's axes are the file's axes in another order and direction, so each coordinate in
         # Blender belongs to one coordinate in the file.
@@ -206,7 +221,14 @@ class _Job:
         key: str,
         difference: NDArray[np.float64],
     ) -> None:
-        """Write the deltas of the edited vertices of a shape key."""
+        """Write the deltas of the edited vertices of a shape key.
+
+        Args:
+            dna_mesh: the mesh of the Dna to write; changed.
+            shape: positions of the mesh object with the user's edits.
+            key: name of the shape key.
+            difference: float64[V, 3], offsets by the user's edit.
+        """
         vertices = np.flatnonzero(np.any(difference != 0, axis=1))
         base = shape.keys[shape.relative[key]]
         delta = shape.keys[key][vertices].astype(np.float64) - base[vertices]
@@ -222,7 +244,13 @@ class _Job:
             target.vertex_indices, target.deltas = indices, deltas
 
     def weights(self, item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-        """Write skin weights of vertices that the user painted; others stay bit-identical."""
+        """Write skin weights of vertices that the user painted; others stay bit-identical.
+
+        Args:
+            item: the mesh object.
+            mesh_plan: the mesh in the imported file.
+            labels: bone names by joint index.
+        """
         present = skin_weights.read(item)
         painted = skin_weights.edited_vertices(present, skin_weights.file_pairs(mesh_plan, labels))
         ours = {name: joint for joint, name in reversed(list(enumerate(labels)))}
@@ -285,7 +313,14 @@ class _Job:
 def _normalised(
     present: skin_weights.Weights, known: Iterable[str], ours: Mapping[str, int], vertex: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Joints and weights of a vertex, with the largest weight first and a sum of 1."""
+    """Joints and weights of a vertex, with the largest weight first and a sum of 1.
+
+    Args:
+        present: weights of the mesh object.
+        known: vertex groups of the object that belong to joints.
+        ours: name of a vertex group -> joint index.
+        vertex: index of the vertex.
+    """
     held = [(present[n][vertex], ours[n]) for n in known if present[n].get(vertex, 0.0) > 0.0]
     held.sort(key=lambda pair: (-pair[0], pair[1]))
     total = sum(weight for weight, _ in held)

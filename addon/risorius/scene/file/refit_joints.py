@@ -185,7 +185,13 @@ def _new_rest(
     edited: Mapping[int, JointEdit],
 ) -> tuple[dict[int, NDArray[np.float64]], set[int]]:
     """The rest matrices of the new joints in the armature's space, with the user's edits; and the
-    joints whose bones must be changed in edit mode."""
+    joints whose bones must be changed in edit mode.
+
+    Args:
+        old, new: joints of the old and of the new file.
+        moved: new index of each old joint; -1 if the new file lacks it.
+        edited: index of an old joint -> edit by the user.
+    """
     back = {k: j for j, k in enumerate(moved) if k >= 0}
     rest, changed = {}, set()
     bent = set()  # edited joints and their descendants, whose rest differs from the file
@@ -222,7 +228,16 @@ def _edit(
     rest: Mapping[int, NDArray[np.float64]],
     changed: Collection[int],
 ) -> list[str]:
-    """Remove, add and move bones in edit mode. Returns: the bone name of each new joint."""
+    """Remove, add and move bones in edit mode. Returns: the bone name of each new joint.
+
+    Args:
+        edit_bones: edit bones of the deforming armature.
+        change: the replacement.
+        kept: index of a new joint -> name of its existing bone.
+        gone: names of bones whose joints the new file lacks.
+        rest: index of a new joint -> float64[4, 4], rest matrix in the armature's space.
+        changed: indices of new joints whose bones must be changed.
+    """
     old, new = change.old.armature, change.new.armature
     follow = _followers(edit_bones, kept, gone)
     for name in gone:
@@ -259,6 +274,11 @@ def _followers(
     """The user's own bones, parents first: (name, new parent, matrix relative to the parent).
 
     With these values the bones follow their joints. New parent None: the bone keeps its parent.
+
+    Args:
+        edit_bones: edit bones of the deforming armature.
+        kept: index of a new joint -> name of its existing bone.
+        gone: names of bones whose joints the new file lacks.
     """
     ours = set(kept.values()) | set(gone)
     found = []
@@ -279,7 +299,13 @@ def _depth(bone: bpy.types.EditBone) -> int:
 
 
 def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> None:
-    """Store the new joint indices on the bones and on the user's copies of these bones."""
+    """Store the new joint indices on the bones and on the user's copies of these bones.
+
+    Args:
+        rig: deforming armature.
+        names: bone name of each new joint.
+        moved: new index of each old joint; -1 if the new file lacks it.
+    """
     by_name = {name: joint for joint, name in enumerate(names)}
     for bone in rig.data.bones:
         former = saved.whole(bone, parts.JOINT, -1, 0)

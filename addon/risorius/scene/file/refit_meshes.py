@@ -119,6 +119,12 @@ def _refit(
     """Give one mesh object the polygons, skin weights, UVs, normals and shape keys of the new file.
 
     The user's edits and attributes are transferred.
+
+    Args:
+        change: the replacement.
+        item: the existing mesh object.
+        old, new: the mesh in the old and in the new file.
+        fresh: the newly built object of the new mesh.
     """
     mesh = item.data
     known = len(mesh.vertices) == len(old.positions)
@@ -144,7 +150,7 @@ def _refit(
 
 
 class _Nothing:
-    """Transfer from a mesh without polygons: nothing is carried over."""
+    """Transfer from a mesh without polygons: values become 0; vertex indices stay if they exist."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -205,7 +211,15 @@ def _own_groups(change: Change, item: MeshObject) -> list[str]:
 def _things(
     change: Change, item: MeshObject, old: plans.MeshPlan | None, shape: Shape, known: bool
 ) -> list[str]:
-    """Descriptions of the user's edits of a mesh and of the user's additions, for a report."""
+    """Descriptions of the user's edits of a mesh and of the user's additions, for a report.
+
+    Args:
+        change: the replacement.
+        item: the mesh object.
+        old: the mesh in the old file; None if the file lacks it.
+        shape: positions of the mesh with the user's edits.
+        known: whether the object has as many vertices as the mesh in the old file.
+    """
     layers, lost = transfer.own_attributes(item.data)
     things = {
         "its own faces": not known or (old is not None and not has_faces_of(item.data, old)),
@@ -226,7 +240,15 @@ def _things(
 def _back_up(
     change: Change, item: MeshObject, old: plans.MeshPlan, shape: Shape, known: bool
 ) -> None:
-    """Keep a copy of a mesh with edits or additions by the user, before its polygons change."""
+    """Keep a copy of a mesh with edits or additions by the user, before its polygons change.
+
+    Args:
+        change: the replacement.
+        item: the mesh object.
+        old: the mesh in the old file.
+        shape: positions of the mesh with the user's edits.
+        known: whether the object has as many vertices as the mesh in the old file.
+    """
     things = _things(change, item, old, shape, known)
     bound = [m.name for m in item.modifiers if m.type in _BOUND]
     if bound:
@@ -256,7 +278,13 @@ def _back_up(
 
 
 def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None:
-    """Remove a mesh that the new file lacks, or hide it if the user edited or extended it."""
+    """Remove a mesh that the new file lacks, or hide it if the user edited or extended it.
+
+    Args:
+        change: the replacement.
+        item: the mesh object.
+        old: the mesh in the old file; None if the file lacks it.
+    """
     label = item.name
     known = old is not None and len(item.data.vertices) == len(old.positions)
     things = ["its unknown origin"]
@@ -283,8 +311,8 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
     change.report.append(
         told(
             (
-                "The mesh {label} is not in the DNA file; in the scene this mesh stays, "
-                "hidden, for {things}."
+                "The mesh {label} is not in the DNA file; in the scene this mesh stays, hidden, "
+                "for {things}."
             ),
             label=label,
             things=", ".join(things),
@@ -295,7 +323,10 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
 def _refit_weights(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan
 ) -> None:
-    """Write the new file's skin weights, except at vertices that the user painted."""
+    """Write the new file's skin weights, except at vertices that the user painted.
+
+    Vertex groups that modifiers or shape keys use do not change.
+    """
     before = skin_weights.file_pairs(old, change.old_bones)
     after = skin_weights.file_pairs(new, change.new_bones)
     if before == after:
@@ -331,7 +362,16 @@ def _masks(item: MeshObject) -> set[str]:
 def _refit_corners(
     change: Change, item: MeshObject, old: plans.MeshPlan, new: plans.MeshPlan, fresh: MeshObject
 ) -> None:
-    """Update UVs, normals and the materials' attributes if the old and the new file differ."""
+    """Update UVs, normals and the materials' attributes if the old and the new file differ.
+
+    A UV map that the user edited stays.
+
+    Args:
+        change: the replacement.
+        item: the existing mesh object.
+        old, new: the mesh in the old and in the new file.
+        fresh: the newly built object of the new mesh.
+    """
     mesh = item.data
     layer = mesh.uv_layers.get("UVMap")
     if new.uvs is not None and not _equal(old.uvs, new.uvs):
@@ -383,6 +423,14 @@ def _rebuild(
     """Replace the polygons inside the mesh datablock.
 
     So the shape keys, the drivers and the pointers to the datablock stay.
+
+    Args:
+        change: the replacement.
+        item: the existing mesh object.
+        new: the mesh in the new file.
+        fresh: the newly built object of the new mesh.
+        surface: data of the old polygons.
+        bearer: converts values of old vertices to values of new vertices.
     """
     mesh = item.data
     own = {n: v for n, v in skin_weights.read(item).items() if n in _own_groups(change, item)}
@@ -418,7 +466,15 @@ def _rebuild(
 def _refit_shape(
     change: Change, item: MeshObject, shape: Shape, new: plans.MeshPlan, bearer: transfer.Carry
 ) -> None:
-    """Set the new neutral mesh with the user's edits, and all shape keys relative to it."""
+    """Set the new neutral mesh with the user's edits, and all shape keys relative to it.
+
+    Args:
+        change: the replacement.
+        item: the existing mesh object.
+        new: the mesh in the new file.
+        shape: positions of the mesh with the user's edits.
+        bearer: converts values of old vertices to values of new vertices.
+    """
     channel_map = change.channel_map()
     dna_mesh = change.after.dna.meshes[new.index]
     deltas = meshes.deltas_by_channel(dna_mesh, change.after.space.delta_matrix)
@@ -440,7 +496,7 @@ def _refit_shape(
 
 
 def _added(points: NDArray[np.float32], moves: NDArray[np.float64]) -> NDArray[np.float32]:
-    """float32 positions plus moves; positions with a move of 0 stay bit-identical."""
+    """float32[V, 3]: positions plus moves; positions with a move of 0 stay bit-identical."""
     result = points.copy()
     rows = np.any(moves != 0, axis=1)
     result[rows] = (points[rows].astype(np.float64) + moves[rows]).astype(np.float32)
@@ -458,6 +514,14 @@ def _points(
     """New coordinates of the shape key `name`.
 
     The shape key to which it is relative is computed first. Both results are stored in `done`.
+
+    Args:
+        name: name of the shape key.
+        shape: positions of the mesh with the user's edits.
+        done: name of a shape key -> new coordinates; None while they are computed.
+        deltas: index of a channel in the new file -> its deltas.
+        channel_map: new index of each old channel, -1 if the new file lacks it.
+        bearer: converts values of old vertices to values of new vertices.
     """
     if name in done:
         return done[name]
@@ -490,6 +554,13 @@ def _drop_gone_keys(
 
     A shape key stays, without its driver, if the user edited it, if it has a vertex group, or if a
     shape key of the user is relative to it.
+
+    Args:
+        change: the replacement.
+        item: the mesh object.
+        shape: positions of the mesh with the user's edits.
+        channel_map: new index of each old channel, -1 if the new file lacks it.
+        deltas: index of a channel in the new file -> its deltas.
     """
     key = parts.keys_there(item)
     needed = {above for name, above in shape.relative.items() if name in shape.own}

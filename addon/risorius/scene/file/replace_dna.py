@@ -48,11 +48,12 @@ def replace_file(
         progress: function that is called with the progress, 0 to 1.
 
     Returns:
-        Sentences about new parts, removed parts, and the user's additions.
+        Sentences about new parts, removed parts, and the user's additions. They are also written to
+        a Text and to the console.
 
     Raises:
         ReplaceError: the character cannot be changed now.
-        DnaError, PlanError, SpaceError: the file cannot be used; nothing was changed.
+        OSError, DnaError, PlanError, SpaceError: the file cannot be used; nothing was changed.
     """
     _check(rig)
     with armatures.kept_selection(context):
@@ -105,7 +106,13 @@ def _options(rig: ArmatureObject, levels: tuple[int, ...], unit: float) -> build
 
 
 def _exchange(context: Context, change: Change, fresh: ArmatureObject) -> None:
-    """Move the data of the new character into the old objects, and remove the new objects."""
+    """Move the data of the new character into the old objects, and remove the new objects.
+
+    Args:
+        context: a Blender context with a view layer.
+        change: the replacement.
+        fresh: deforming armature of the newly built character.
+    """
     rig = change.rig
     ordinary.leave(rig)
     refit_joints.replace_joints(context, change)
@@ -172,6 +179,10 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
     """Copy the stored DNA file and the armatures' properties to the old rig.
 
     The arrays of animated maps and blend shape channels get the lengths for the new file.
+
+    Args:
+        change: the replacement.
+        fresh: deforming armature of the newly built character.
     """
     rig, controls = change.rig, parts.controls_there(change.rig)
     text, former = fresh[parts.DNA], storage.text_of(rig)
@@ -205,7 +216,13 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
 
 
 def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
-    """Add a mesh that only the new file has to the character, unless the user deleted it before."""
+    """Add a mesh that only the new file has to the character, unless the user deleted it before.
+
+    Args:
+        change: the replacement.
+        fresh: deforming armature of the newly built character.
+        item: the newly built mesh object.
+    """
     rig = change.rig
     label = next(m.label for m in change.new.meshes if m.index == item[parts.MESH])
     was = {names.unique_labels(change.before.dna.mesh_names)[m.index] for m in change.old.meshes}
@@ -296,6 +313,8 @@ def _renew_board(
     places: Mapping[str, tuple[float, ...]],
 ) -> None:
     """Build a face board for the new file; handles with the same names keep their location.
+
+    Nothing changes if there was no board, or if both files have the same handles.
 
     Args:
         context: with a view layer.

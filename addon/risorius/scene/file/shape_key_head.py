@@ -35,13 +35,16 @@ def usable_head(item: bpy.types.Object | None) -> bool:
 
 
 def head_of(context: Context) -> MeshObject | None:
-    """The active object if it is a usable head, else the first usable selected object, or None."""
+    """The active object if `usable_head` accepts it, else the first selected object it accepts.
+
+    None if it accepts no such object.
+    """
     there = [context.active_object, *context.selected_objects]
     return next((cast(MeshObject, item) for item in there if usable_head(item)), None)
 
 
 def taken_with(context: Context, head: MeshObject) -> list[MeshObject]:
-    """The head and all other selected meshes that are no part of a face.
+    """The head and all other selected meshes with polygons that are no part of a face.
 
     Args:
         context: has the selection.
@@ -95,10 +98,12 @@ def shapes_of(
 
     Args:
         context: its scene gives the unit.
-        item: mesh object of the head with shape keys, see usable_head.
+        item: mesh object of the head with shape keys.
         others: meshes that belong to the head: teeth, eyes, hair.
         height_mm: the head is scaled to this height from chin to top of the head; 0: no scaling.
-        said: the user's assignment of shape keys to controls, see risorius.author.input.said.
+        said: name of a shape key -> the meaning that the user chose: the name of a raw control
+            without prefix, "=" followed by the name of an ARKit unit, "@" followed by the name of
+            an expression, or a list of raw controls; [] leaves the key out.
 
     Raises:
         HeadError: the shape keys are not relative, or the mesh has no polygons.
@@ -135,8 +140,12 @@ def _axes(context: Context) -> Doubles:
 def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
     """The neutral mesh of an object without its shape keys; its Mirror modifiers are applied.
 
+    If the object has a shown Mirror modifier, its shape keys are included at their current values.
+
     Args:
-        context, item, head: see part_of.
+        context: its scene gives the unit.
+        item: the object.
+        head: mesh object of the head; its location becomes the origin.
     """
     author, heads = native.part("author.input.obj"), native.part("author.heads.parts")
     keys, whole = item.data.shape_keys, _mirrored(context, item)
@@ -174,7 +183,7 @@ def _groups(item: MeshObject, mesh: bpy.types.Mesh, points: Doubles) -> dict[str
 
 
 def _mirrored(context: Context, item: MeshObject) -> bpy.types.Mesh | None:
-    """A new mesh with the Mirror modifiers of an object applied; None if it has none."""
+    """A new mesh with the shown Mirror modifiers of an object applied; None if there is none."""
     kinds = [modifier.type for modifier in item.modifiers if modifier.show_viewport]
     if "MIRROR" not in kinds:
         return None
@@ -281,12 +290,14 @@ def rig_task(
     wishes: RigWishes,
     said: Mapping[str, str | list[str]] | None = None,
 ) -> Task[Rigged]:
-    """A task that makes a joint rig and writes its DNA file; if cancelled, it writes no file.
+    """A task that makes a joint rig and writes its DNA file and expressions.
+
+    A cancelled task writes no file.
 
     Args:
         shapes: the head and its shapes, from shapes_of.
         wishes: options of the rig.
-        said: the user's assignment of shape keys to controls, see risorius.author.input.said.
+        said: name of a shape key -> the user's meaning, in the form that shapes_of describes.
     """
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Rigged:
@@ -305,7 +316,9 @@ def make_rig(
     """Make a joint rig and write its DNA file and expressions, without using Blender data.
 
     Args:
-        shapes, wishes, said: see rig_task.
+        shapes: the head and its shapes, from shapes_of.
+        wishes: options of the rig.
+        said: name of a shape key -> the user's meaning, in the form that shapes_of describes.
         progress: function that is called with the progress, 0 to 1.
         cancelled: function that returns whether to stop; then no file is written.
     """
@@ -337,11 +350,10 @@ def joint_rig(
     Args:
         dna: the face with blend shapes.
         wishes: options of the rig.
-        kept: texts; a mesh whose name contains one of them keeps its skin weights and blend shapes,
-            see RigOptions.
+        kept: texts; a mesh whose name contains one of them keeps its skin weights and blend
+            shapes.
         progress: function that is called with the progress, 0 to 1; it returns False to cancel.
-        fit_vertices: number of vertices to which joints are fitted, see RigOptions; None: the
-            default.
+        fit_vertices: number of vertices to which joints are fitted; None: the default number.
     """
     author = native.part("author")
     options = author.RigOptions(
@@ -360,7 +372,9 @@ def joint_rig(
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:
     """Give the meshes of LOD 0 the materials of the objects that the face was made from.
 
-    The new meshes and these objects must have the same polygons in the same order.
+    A new mesh must have the polygons of its object, or the part of them that the face uses, in the
+    same order. They may be repeated, as a Mirror modifier repeats them. If the numbers of polygons
+    do not fit, the mesh is skipped.
 
     Args:
         meshes: mesh objects of the new face.

@@ -163,6 +163,8 @@ class OldSurface:
     def give(self, mesh: bpy.types.Mesh, points: NDArray[np.float32], carry: Carry) -> None:
         """Transfer the user's attributes and the polygons' material indices to the new polygons.
 
+        Nothing is transferred if the old or the new mesh has no polygons.
+
         Args:
             mesh: the Mesh with its new polygons.
             points: float32[W, 3], new neutral vertices.

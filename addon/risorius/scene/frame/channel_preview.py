@@ -40,7 +40,10 @@ def clear(rig: ArmatureObject) -> bool:
 
 
 def clear_all() -> bool:
-    """End the overrides of all characters, and update the faces. Returns: whether any ended."""
+    """End the overrides of all characters; the next update evaluates their faces.
+
+    Returns: whether any override ended.
+    """
     ended = [rig for rig in parts.rigs() if clear(rig)]
     for rig in ended:
         last_written.forget()

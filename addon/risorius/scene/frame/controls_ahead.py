@@ -87,7 +87,7 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
 
     Returns:
         The graph, and the faces whose controls can be read in it. Faces whose controls depend on a
-        face are left out. (None, []) if another thread uses the graph.
+        face are left out. (None, []) if another thread uses the graph or no face is left.
     """
     if not _LOCK.acquire(blocking=False):
         return None, []

@@ -65,7 +65,8 @@ class _Ahead:
     """The work done for a character before its frame.
 
     Attributes:
-        glance: result of _glance; None if other inputs move the face too.
+        glance: sliders, bones and settings of the evaluated control armature; None if other inputs
+            move the face too.
         wrote: whether anything was written.
         rendering: whether the frame is rendered.
     """
@@ -90,7 +91,7 @@ def is_paused() -> bool:
 
 
 def evaluate_all(depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> None:
-    """Evaluate all characters of this file and write their poses.
+    """Evaluate all characters of this file and write their poses; does nothing while `paused`.
 
     Args:
         depsgraph: the evaluated dependency graph to read from.
@@ -135,9 +136,13 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
 
 
 def _look_at_joints(edited: bool) -> bool:
-    """Update the Reading (see joint_readings.py) of all faces once per frame.
+    """Update the Reading (sources of joint rotations) of all faces once per frame.
 
-    Returns: whether a joint rotation of any face is read from its bone.
+    Args:
+        edited: whether the file may have been edited since the last frame.
+
+    Returns:
+        Whether a joint rotation of any face is read from its bone.
     """
     found = False
     for rig in parts.rigs():
@@ -177,7 +182,11 @@ def after_frame(depsgraph: Depsgraph) -> None:
 
 
 def _glance(seen: ArmatureObject) -> tuple[object, ...]:
-    """The inputs of a character for which _is_simple is True. Args: seen  evaluated controls."""
+    """The inputs of a character that only its control armature moves, for comparison.
+
+    Args:
+        seen: the evaluated control armature.
+    """
     bones = seen.pose.bones
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)
@@ -198,7 +207,15 @@ def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
 
 
 def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bool:
-    """Whether a character's controls are equal before and after the evaluation of the frame."""
+    """Whether a character's controls are equal before and after the evaluation of the frame.
+
+    False also if other inputs move the face, or if only one of both evaluations is for a render.
+
+    Args:
+        rig: deforming armature.
+        done: the work done before the frame.
+        depsgraph: graph after the evaluation of the frame.
+    """
     controls = parts.controls_of(rig)
     if done.glance is None or controls is None:
         return False
@@ -218,7 +235,9 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
         moment: the moment of the update.
 
     Returns:
-        Whether a changed pose was written.
+        Whether the pose was written; False if its inputs are unchanged and the moment is not ANEW,
+        if Blender refused the bones, or if the character cannot be evaluated: it is baked, has no
+        controls or Runtime, is not in this scene, or lacks the bone with the sliders.
     """
     times = [perf_counter()]
     controls = None if parts.BAKED in rig else parts.controls_of(rig)  # baked: its actions move it
@@ -276,7 +295,14 @@ def _write_meshes(
 ) -> None:
     """Write the live keys of the meshes that a level of detail shows.
 
-    Args: see direct.prepare and live_keys.write.
+    Args:
+        rig: deforming armature.
+        live: Runtime of the character.
+        shape: joint deltas, channel weights and rotations of the pose.
+        plan: the Plan of the face, which names the meshes in Direct mode.
+        lod: the level of detail.
+        anew: write unchanged values too.
+        ahead: whether Blender evaluates the frame only after this write.
     """
     finished = []
     for item in parts.meshes_of(rig):
@@ -294,7 +320,8 @@ def _write_meshes(
 def _write_finished(job: direct.Job) -> None:
     """Write final vertex positions of a face to its meshes.
 
-    Inside `together` they are collected, and written later with other faces on all cores.
+    Inside the context manager `together` the positions are collected, and written at its end with
+    the other faces on all cores.
     """
     if _gathered.now is None:
         direct.write([job])
@@ -329,7 +356,12 @@ def _plan(
 ) -> conditions.Plan:
     """The Plan of a face: whether it is evaluated in Direct mode or by Blender's modifiers.
 
-    Args: see evaluate; asked  inputs of the face.
+    Args:
+        rig: deforming armature.
+        live: Runtime of the character.
+        asked: inputs of the face.
+        moment: the moment of the update.
+        rendering: whether the frame is rendered.
     """
     if rendering:  # a change of mode during a render would rebuild Blender's graph
         return conditions.known(rig) or conditions.ORDINARY
@@ -343,7 +375,14 @@ def _plan(
 
 
 def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment: Moment) -> int:
-    """The level of detail to show. Args: see evaluate; seen  the evaluated control armature."""
+    """The level of detail to show.
+
+    Args:
+        rig: deforming armature.
+        seen: the evaluated control armature.
+        depsgraph: the evaluated dependency graph.
+        moment: the moment of the update.
+    """
     if moment not in _BEFORE_FRAME:
         return lods.choose(rig, seen, depsgraph)
     last = last_written.inputs.get(rig.session_uid)

@@ -34,7 +34,8 @@ def read_inputs(
         seen: the evaluated control armature object.
         live: the character's Runtime.
         depsgraph: graph with the bones of the body to which the face may be attached.
-        maximum: upper limit of the sliders, and of look controls after adding the eye bones.
+        maximum: upper limit of sliders that layers change, and of look controls after adding the
+            eye bones.
 
     Returns:
         float32[R] raw controls, and rotations: "neck" and "head" -> Quaternion in the armature's
@@ -53,7 +54,10 @@ def read_mixed(
     """Read the sliders and the control bones with the layers applied.
 
     Args:
-        seen, live, depsgraph, maximum: see `read_inputs`.
+        seen: the evaluated control armature object.
+        live: the character's Runtime.
+        depsgraph: its scene gives the time at which the layers are read.
+        maximum: upper limit of sliders that layers change.
 
     Returns:
         float32[R] raw controls, before the eye bones add to the look controls; and the rotations of
@@ -109,7 +113,8 @@ def complete(
         own: rotations of the character's own control bones, with layers.
 
     Returns:
-        raw, and the rotations of neck and head including the body, see `read_inputs`.
+        raw; and the rotations of neck and head including the body: "neck" and "head" -> Quaternion
+        in the armature's axes, without entries for unrotated bones.
     """
     turns = rig_placement.body_turns(seen.original, depsgraph)
     share = seen.risorius_body_turn
@@ -186,7 +191,16 @@ def _add_look(
     turns: Turns,
     own: layer_mixing.Bones,
 ) -> None:
-    """Add the rotations of eye bones and gaze target to the look controls, and move the lids."""
+    """Add the rotations of eye bones and gaze target to the look controls, and move the lids.
+
+    Args:
+        seen: the evaluated control armature.
+        live: the character's Runtime.
+        raw: float32[R], the sliders with their layers; changed in place.
+        maximum: upper limit of the look controls.
+        turns: rotations of neck and head including the body.
+        own: rotations of the character's own control bones, with layers.
+    """
     bones = seen.pose.bones
     eyes = {side: bones[f"eye_{side}"] for side in live.look if f"eye_{side}" in bones}
     target = gaze.target_of(seen, live, turns, own.target)

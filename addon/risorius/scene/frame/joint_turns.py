@@ -53,6 +53,8 @@ def fill(
 ) -> None:
     """Set the raw controls of joint rotations in place.
 
+    Nothing changes if the property `risorius_neck_poses` of the control armature is off.
+
     Args:
         seen: the evaluated control armature.
         live: the character's Runtime.

@@ -24,7 +24,8 @@ class _Late:
 
     Attributes:
         cause: name of the control or constraint that makes the face late.
-        wiring: result of _wiring when the reason was found.
+        wiring: parent, drivers and constraints of the controls when the record was made; empty for
+            a face whose controls depend on no face.
         frames: number of late frames.
     """
 
@@ -69,6 +70,9 @@ def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
 def count(rig: ArmatureObject, before: object, after: object, labels: Sequence[str]) -> None:
     """Count a frame after which a face had to be evaluated again.
 
+    Without a known dependency on a face, the frame counts only if a raw control or the rotation of
+    the head differs.
+
     Args:
         rig: deforming armature.
         before, after: states from last_written.inputs before and after this evaluation: a tuple
@@ -89,6 +93,10 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
     """The first control with different values in two states, or a text about the head's rotation.
 
     "" if only other inputs differ, such as the level of detail.
+
+    Args:
+        before, after: tuples that begin with the bytes of the raw controls; other types give "".
+        labels: names of the raw controls.
     """
     if not isinstance(before, tuple) or not isinstance(after, tuple):
         return ""

@@ -24,7 +24,7 @@ from ..character import runtime
 Float = NDArray[np.float64]
 
 CONSTRAINT = "Risorius Gaze"  # makes the target follow an object or the world, not the head
-STEPS = 4  # at most; on the sample face the error is below 0.001 degrees after the second
+STEPS = 4  # most steps of the search; the sample face has less than 0.001 degrees error after 2
 _ENOUGH = 2e-5  # radians, about 0.001 degrees: a smaller change ends the search
 _AHEAD = np.array([0.0, -1.0, 0.0])
 _BLEND = 0.25  # eyes meet on a target that has moved by this fraction of its rest distance
@@ -173,7 +173,15 @@ def _error(
     live: runtime.Runtime, deltas: NDArray[np.float32], side: str, centre: Vector, target: Target
 ) -> Float:
     """float64[2]: yaw and pitch in radians by which the wanted direction of an eye differs from its
-    current direction."""
+    current direction.
+
+    Args:
+        live: the character's Runtime.
+        deltas: float32[J, 9] of a Pose.
+        side: "L" or "R".
+        centre: centre of the eye at rest, in the armature's space.
+        target: the Target.
+    """
     joint, ahead = live.anchors.eyes.get(side), _AHEAD
     still, rest = np.array(centre[:], np.float64), np.array(target.rest[:], np.float64)
     there = still

@@ -52,9 +52,9 @@ def _all() -> dict[str, object]:
         "risorius_neck_poses": bpy.props.BoolProperty(
             name="Head Drives Neck Poses",
             description=(
-                "Set the raw controls of head and neck rotation from the joints, so "
-                "that the corrective poses of the DNA file correct neck and jaw. "
-                "Off: their sliders set these raw controls"
+                "Set the raw controls of head and neck rotation from the joints, so that the "
+                "corrective poses of the DNA file correct neck and jaw. Off: the sliders of "
+                "these raw controls set them"
             ),
             default=True,
             override=_OVERRIDE,

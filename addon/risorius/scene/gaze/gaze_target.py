@@ -36,6 +36,8 @@ def _hold_of(controls: ArmatureObject) -> bpy.types.CopyLocationConstraint | Non
 def follow_head(context: Context, controls: ArmatureObject) -> None:
     """Let the target follow the head again; the target stays at its visible position.
 
+    An Empty that `follow_world` made for this target is removed.
+
     Args:
         context: Blender context; its depsgraph has the evaluated bones.
         controls: control armature of the character.
@@ -60,7 +62,7 @@ def follow_object(context: Context, controls: ArmatureObject, item: bpy.types.Ob
     """Let the eyes look at an object.
 
     Args:
-        context: see follow_head.
+        context: Blender context; its depsgraph has the evaluated bones.
         controls: control armature of the character.
         item: an object outside the character.
     """

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-_COIL = re.compile(r"radius=(\d+(?:\.\d+)?) pitch=(\d+(?:\.\d+)?)")  # mm
+_COIL = re.compile(r"radius=(\d+(?:\.\d+)?) pitch=(\d+(?:\.\d+)?)")  # in mm
 # (strands per lock, locks per card) for large coils and for small coils.
 _LOCKS = ((6, 5), (3, 10))
 _LARGE = 0.0013  # metres: a coil with a smaller radius is a small coil

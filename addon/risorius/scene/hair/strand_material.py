@@ -28,7 +28,7 @@ def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
     tree = compat.tree_of(material)
     shader = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
     shader.inputs["Roughness"].default_value = 0.5
-    shader.inputs["Specular IOR Level"].default_value = 0.2  # more makes brows grey
+    shader.inputs["Specular IOR Level"].default_value = 0.2  # a higher level makes brows grey
     source: Any = cards_look.node_tree if cards_look is not None else None
     pictures = [n for n in source.nodes if n.type == "TEX_IMAGE" and n.image] if source else []
     colour = None
@@ -72,7 +72,8 @@ def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
         fibre.model = "CHIANG"
     fibre.parametrization = "COLOR"
     fibre.inputs["Roughness"].default_value = 0.55
-    fibre.inputs["IOR"].default_value = 1.3  # oiled: with 1.55 light from behind makes it grey
+    # As for oiled hair; with 1.55, light from behind would make the hair grey.
+    fibre.inputs["IOR"].default_value = 1.3
     if colour is not None:
         # The image shows the light of many fibres together, so a single fibre gets a darker colour.
         tree.links.new(_raised(tree, colour, _DEEPER), fibre.inputs["Color"])

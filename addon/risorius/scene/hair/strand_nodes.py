@@ -147,7 +147,13 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
 
 
 def _lines(g: _Tree, count: int, rows: int) -> Node:
-    """Straight curves with one point per row of a card. Args: count  number of curves."""
+    """Straight curves with one point per row of a card.
+
+    Args:
+        g: the tree.
+        count: number of curves.
+        rows: rows of vertices per card.
+    """
     line = g.node("GeometryNodeCurvePrimitiveLine")
     line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
     dots = g.node("GeometryNodePoints", {"Count": count})
@@ -264,7 +270,14 @@ def _lengths(item: MeshObject, rows: int) -> NDArray[np.float32]:
 
 
 def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
-    """The number of points per strand; coils need more, the longer the cards are."""
+    """The number of points per strand; coils need more, the longer the cards are.
+
+    Args:
+        item: mesh of the cards.
+        rows: rows of vertices per card.
+        kind: kind of strands.
+        unit: metres per Blender unit.
+    """
     if kind.coil is None:
         return 2 * rows + 2
     turns = float(np.quantile(_lengths(item, rows), 0.9)) * unit / kind.coil.pitch

@@ -53,9 +53,10 @@ def next_key(
     """The frame of the next or previous keyframe; None if there is no such keyframe.
 
     Args:
-        controls, paths: see key_frames.
+        controls: the control armature.
         frame: current frame.
         forward: True: next; False: previous.
+        paths: data paths whose keyframes count; None: all sliders and control bones.
     """
     frames = key_frames(controls, paths)
     there = [f for f in frames if (f > frame + _AT if forward else f < frame - _AT)]
@@ -79,7 +80,8 @@ def neighbours(
         skipped: frames whose keyframes do not count.
 
     Returns:
-        Neighbours. If there are only earlier or only later keyframes, both poses are equal.
+        Neighbours. If there are only earlier or only later keyframes, both poses are equal, and
+        `share` is 0.5.
 
     Raises:
         FaceError: there is no earlier and no later keyframe.
@@ -132,7 +134,7 @@ def move(
         paths: data paths of the controls to move.
 
     Returns:
-        Names of the moved sliders.
+        Names of the sliders with a path in `paths`, even if their values do not change.
     """
     controls = parts.controls_there(rig)
     values = {
@@ -153,7 +155,13 @@ def move(
 def _blended(
     path: str, start: tuple[float, ...], goal: tuple[float, ...], factor: float
 ) -> list[float]:
-    """Mix two tuples; quaternions are mixed along the shorter arc and normalised."""
+    """Mix two values of a property; quaternions are mixed along the shorter arc and normalised.
+
+    Args:
+        path: data path of the property, which tells whether the value is a quaternion.
+        start, goal: components of the two values.
+        factor: 0 gives `start`, 1 gives `goal`; other factors extrapolate.
+    """
     if not path.endswith("rotation_quaternion"):
         return [a + (b - a) * factor for a, b in zip(start, goal, strict=True)]
     sign = -1.0 if sum(a * b for a, b in zip(start, goal, strict=True)) < 0.0 else 1.0
@@ -165,7 +173,9 @@ def _blended(
 def rest_pose(rig: ArmatureObject, now: keying.Pose) -> keying.Pose:
     """The rest values of the sliders and bones that the pose `now` contains.
 
-    Args: rig  the character, now  the pose.
+    Args:
+        rig: the character.
+        now: the pose.
     """
     live = runtime.there(rig)
     rests = dict(zip(live.labels, live.rests, strict=True))

@@ -101,6 +101,8 @@ def layer_of(controls: ArmatureObject) -> layer_properties.RISORIUS_PG_layer | N
 def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink, name: str) -> None:
     """Add a blink to the blink layer, which can only close the eyes further than the sliders.
 
+    Keys of the layer during the blink are replaced.
+
     Args:
         rig: the character.
         frame: frame at which the blink begins.

@@ -32,7 +32,7 @@ def toggle(controls: ArmatureObject, names: Collection[str], users: str) -> str:
     Args:
         controls: control armature of the face.
         names: names of the sliders.
-        users: see `of`.
+        users: the user's favourites, one name per line, for a face without its own list.
 
     Returns:
         The new list, one name per line.

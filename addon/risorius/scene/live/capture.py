@@ -32,8 +32,8 @@ _REDRAW = 0.25  # seconds between redraws of the status
 class _State:
     """State of the timer that writes captured faces."""
 
-    error: str = ""  # why the last capture ended by itself
-    since_redraw: float = 0.0  # seconds
+    error: str = ""  # why the last capture ended by itself; "" if it did not
+    since_redraw: float = 0.0  # seconds since the last redraw of the sidebars
     undone: bool = False  # whether undo or redo ran since the last tick
 
 
@@ -73,7 +73,7 @@ def stop(controls: bpy.types.Object | None) -> bool:
     """End the capture of a character and restore its earlier values.
 
     Returns:
-        Whether a capture ran. An unfinished recording is kept, see recordings.waiting.
+        Whether a capture ran. Its unfinished recording is kept for recordings.waiting.
     """
     session = sessions.of(controls)
     if session is None:
@@ -83,7 +83,7 @@ def stop(controls: bpy.types.Object | None) -> bool:
 
 
 def stop_all() -> None:
-    """End every capture; characters that are still there get their values back."""
+    """End every capture; characters that still exist get their values from before the capture."""
     for session in sessions.running():
         _end(session)
     if bpy.app.timers.is_registered(_tick):
@@ -142,7 +142,8 @@ def finish_take(
         clip_actions.Report, or None if nothing was received.
 
     Raises:
-        clip_units.ClipError: see recordings.finish; the recording is kept in `recordings`.
+        clip_units.ClipError: no control of the recording fits this face, the recording is longer
+            than Blender can play, or the NLA is being edited. `recordings` keeps the recording.
     """
     recording = _lay_by(session)
     return recordings.finish(recording, rig, scene) if recording is not None else None

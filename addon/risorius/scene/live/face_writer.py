@@ -62,7 +62,13 @@ def _follow_ranges(session: Session, controls: ArmatureObject) -> None:
 
 
 def _plan(session: Session, controls: ArmatureObject, controlled: tuple[str, ...]) -> None:
-    """Find the slider of this character for each control of the capture."""
+    """Find the slider of this character for each control of the capture.
+
+    Args:
+        session: session of the character; its names and sliders are set.
+        controls: the control armature.
+        controlled: control names of the captured frame.
+    """
     rig = parts.rig_of(controls)
     assert rig is not None
     live = runtime.there(rig)

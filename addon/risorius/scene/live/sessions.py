@@ -92,7 +92,7 @@ class Session:
         return _receivers[self.key]
 
     def controls(self) -> ArmatureObject | None:
-        """The control armature, or None if it was deleted."""
+        """The control armature; None if it was deleted or lacks the bone with the sliders."""
         item = cast("ArmatureObject | None", bpy.data.objects.get(self.name))
         if item is None or item.session_uid != self.uid:
             found = (o for o in bpy.data.objects if o.session_uid == self.uid)

@@ -24,7 +24,12 @@ def levels_of(item: MeshObject) -> list[int]:
 
 
 def shows(item: MeshObject, level: int) -> bool:
-    """Whether a level shows a mesh; a mesh without levels is always shown. Args: item the mesh."""
+    """Whether a level shows a mesh; a mesh without levels is always shown.
+
+    Args:
+        item: the mesh object.
+        level: number of the level.
+    """
     return parts.LODS not in item or level in levels_of(item)
 
 
@@ -74,8 +79,11 @@ def show(rig: ArmatureObject, viewport: int | None = None, render: int | None = 
 
 
 def distances(rig: ArmatureObject) -> list[float]:
-    """Camera distances in Blender units at which each level changes to the next one. Args: rig
-    deforming armature."""
+    """Camera distances in Blender units at which each level changes to the next one.
+
+    Args:
+        rig: the deforming armature.
+    """
     return saved.numbers(rig, parts.LOD_DISTANCES, 0.0)
 
 
@@ -85,7 +93,7 @@ def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) 
     Args:
         rig: the deforming armature.
         enable: True: on; False: off.
-        size: size of the face in Blender units, for initial distances.
+        size: size of the face in Blender units, for initial distances; None: 0.25.
     """
     levels = built(rig)
     if enable and levels and not distances(rig):
@@ -102,7 +110,7 @@ def expected(rig: ArmatureObject, rendering: bool, last: int | None) -> int:
     Args:
         rig: the deforming armature.
         rendering: whether the frame is rendered.
-        last: the level of the frame before, if there was one.
+        last: the level of the last evaluation; None if there was none.
     """
     if by_distance(rig) and last is not None:
         return last

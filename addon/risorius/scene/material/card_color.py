@@ -27,7 +27,8 @@ def color_of(look: Look, mesh: plans.MeshPlan) -> Color | None:
         mesh: cards of hair.
 
     Returns:
-        Linear colour and opacity, 0 to 1; None without UV map or without a picture with alpha.
+        Linear colour and opacity, 0 to 1; None without UV map, without a readable picture with
+        alpha, or if the cards show only transparent parts of the picture.
     """
     picture = look.image("color")
     if picture is None or picture.channels != 4 or mesh.uvs is None or not len(mesh.face_starts):
@@ -60,7 +61,12 @@ def _places(uvs: NDArray[np.float32], starts: NDArray[np.int32]) -> NDArray[np.f
 
 
 def _at(pixels: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float32]:
-    """float32[n, 4]: the texels of a repeating picture at UV coordinates."""
+    """float32[n, 4]: the texels of a repeating picture at UV coordinates.
+
+    Args:
+        pixels: float32[h, w, 4], row 0 at v = 0.
+        places: float64[n, 2], the UV coordinates.
+    """
     height, width = pixels.shape[:2]
     column, row = (
         (np.nan_to_num(places[:, axis]) % 1.0 * size).astype(np.int64).clip(0, size - 1)

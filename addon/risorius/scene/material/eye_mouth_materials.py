@@ -62,9 +62,10 @@ def _textured_normal(graph: Graph, look: Look) -> Socket | None:
 def eyes(graph: Graph, look: Look) -> None:
     """Build the material of eyes: sclera with veins, hollow iris and pupil.
 
-    The clear coat over all three is the cornea. The coat keeps the smooth normal of the eyeball, so
-    that the highlight is round. The hollow iris is lit on the side away from the light, as
-    refraction lights a real iris.
+    With a separate cornea mesh and a colour texture, the iris is dry and only the sclera is wet.
+    Otherwise the clear coat over all three is the cornea. The coat keeps the smooth normal of the
+    eyeball, so that the highlight is round. The hollow iris is lit on the side away from the light,
+    as refraction lights a real iris.
 
     Args:
         graph: Graph of the material.
@@ -156,7 +157,13 @@ def _gray(graph: Graph, value: Value) -> Socket:
 
 
 def _film(graph: Graph, look: Look, low: float, high: float) -> Socket:
-    """Uneven wetness: a roughness that noise varies between two values."""
+    """Uneven wetness: a roughness that noise varies between two values.
+
+    Args:
+        graph: Graph of the material.
+        look: Look of the mesh.
+        low, high: the two values, 0 to 1.
+    """
     uneven = graph.noise(graph.rest_points(look.extent), 14.0 / look.unit, detail=3.0)
     return graph.math("MULTIPLY_ADD", uneven, high - low, low)
 

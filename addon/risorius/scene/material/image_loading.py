@@ -29,7 +29,7 @@ COLOR_SPACES = (
     "sRGB OETF",
 )
 DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
-PACK_LIMIT = 64 << 20  # bytes; larger files are not packed, or a .blend would grow to gigabytes
+PACK_LIMIT = 64 << 20  # bytes; larger files stay outside, or a .blend would grow to gigabytes
 # Limits of the memory for images, in bytes. One image may take _ONE_IMAGE + _MOST_TIMES * its file
 # size. All images of an import together may take _ALL_IMAGES + _MOST_TIMES * the sum of their file
 # sizes. So an image of 8192 x 8192 pixels of 4 bytes is accepted even if its file is tiny because
@@ -82,9 +82,10 @@ def _room_for(path: Path) -> int:
     if room > limit:
         raise ValueError(
             told(
-                "The texture {file} of {width:,} x {height:,} pixels stays away: it "
-                "needs {room:,} bytes, at most {limit:,} are allowed for a file of "
-                "its size.",
+                (
+                    "The texture {file} of {width:,} x {height:,} pixels stays away: it needs "
+                    "{room:,} bytes, at most {limit:,} are allowed for a file of its size."
+                ),
                 file=path.name,
                 width=width,
                 height=height,
@@ -109,7 +110,7 @@ class Images:
         self._room, self._files = 0, 0  # bytes of all loaded images, in memory and as files
 
     def load(self, path: Path | None, data: bool = False) -> bpy.types.Image | None:
-        """The image of a file, or None if it is missing or unreadable.
+        """The image of a file; None if it is missing, unreadable or needs too much memory.
 
         Args:
             path: path of the file; None gives None.
@@ -172,9 +173,11 @@ class Images:
         if self._room + room > limit:
             raise ValueError(
                 told(
-                    "The texture {file} stays away: together with the textures "
-                    "before it, it needs {room:,} bytes, at most {limit:,} are "
-                    "allowed for files of their size.",
+                    (
+                        "The texture {file} stays away: together with the textures before it, it "
+                        "needs {room:,} bytes, at most {limit:,} are allowed for files of their "
+                        "size."
+                    ),
                     file=path.name,
                     room=self._room + room,
                     limit=limit,
@@ -254,7 +257,7 @@ def _small_copy(path: Path) -> NDArray[np.float32] | None:
         return None
     try:
         set_color_space(image, True)
-        image.alpha_mode = "CHANNEL_PACKED"  # the alpha is a mask like the others
+        image.alpha_mode = "CHANNEL_PACKED"  # alpha is a mask like red, green and blue
         if not image.size[0]:
             return None
         image.scale(TILE, TILE)

@@ -23,7 +23,7 @@ class Look:
     """The inputs from which one material is built.
 
     Attributes:
-        kind: kind of the mesh, see MeshPlan.
+        kind: kind of the mesh: skin, eyes, teeth, tongue, lashes, hair, wet, gum or cloth.
         base: mesh name without LOD.
         rig: the deforming armature of the character, whose animated maps the material reads.
         extent: float64[3] size of the mesh in Blender units.
@@ -37,8 +37,8 @@ class Look:
         border: whether the mesh has an open border away from the face, such as at the neck.
         found: textures found for the face.
         images: loader of images.
-        atlas, places: image with the wrinkle masks of all regions; region -> its tile and colour
-            channel in this image.
+        atlas: image of square tiles with the wrinkle masks of all regions; None without masks.
+        places: region -> column and row of its tile, colour channel, number of tiles in a row.
         offsets: role -> whether that wrinkle map stores differences; filled when needed.
     """
 
@@ -64,7 +64,8 @@ class Look:
         """The image that the mesh uses for a role, or None.
 
         Args:
-            role: purpose of a texture, such as "color", "cavity" or "normal:2", see texture_search.
+            role: purpose of a texture, such as "color", "cavity" or "normal:2" (the normals of
+                wrinkle set 2); texture_search.TexturePlan lists all roles.
             data: whether the pixels are numbers instead of colours.
         """
         return self.images.load(self.found.of(self.base, role), data)

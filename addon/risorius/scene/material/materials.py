@@ -117,7 +117,13 @@ def _look(
 def _build(
     plan: plans.CharacterPlan, look: Look, made: list[bpy.types.ID]
 ) -> list[bpy.types.Material]:
-    """Build the materials of one mesh name without LOD, in the order of their slots."""
+    """Build the materials of one mesh name without LOD, in the order of their slots.
+
+    Args:
+        plan: gives the name of the character.
+        look: the Look of the meshes.
+        made: receives every new datablock.
+    """
     material = bpy.data.materials.new(f"{plan.name}_{look.base}")
     made.append(material)
     material.diffuse_color = _VIEW_COLORS[look.kind]
@@ -229,6 +235,11 @@ def _add_border(
     """Write an attribute: 1 at an open border away from the face, falling to 0 with distance.
 
     A mesh without such a border gets no attribute.
+
+    Args:
+        mesh: the mesh of a skin.
+        points: float32[V, 3], its vertices in Blender units.
+        frame: place and size of the face.
     """
     edges = np.empty(2 * len(mesh.edges), np.int32)
     mesh.edges.foreach_get("vertices", edges)
@@ -279,7 +290,12 @@ def _tooth_coordinates(
     points: NDArray[np.float32] | NDArray[np.float64], unit: float
 ) -> NDArray[np.float64]:
     """float64[V, 3]: position along the arch, pi per tooth; height from the mesh's middle, -1 to
-    1; and 0."""
+    1; and 0.
+
+    Args:
+        points: float[V, 3], vertices of the teeth in Blender units.
+        unit: distance between the eyes in Blender units.
+    """
     points = points.astype(np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
     half = max((high[0] - low[0]) / 2, 1e-9)

@@ -232,7 +232,7 @@ class Graph:
         Args:
             image: the image.
             vector: coordinates; None for the UV map.
-            label: shown as its title.
+            label: title of the node.
             clamp: extend the edge instead of repeating the image.
         """
         node = self.node("TexImage", label)

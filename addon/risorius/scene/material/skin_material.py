@@ -19,7 +19,8 @@ from .nodes import Graph, Value
 
 MAP_PREFIX = "risorius_map_"
 AREAS = tuple(f"risorius_areas_{i}" for i in (1, 2, 3))  # mesh attributes: three areas each
-FOLDS = "risorius_folds"  # mesh attribute: x, height, distance from the mouth
+# Mesh attribute: x, height and distance from the mouth, as computed by skin_folds.fold_coordinates.
+FOLDS = "risorius_folds"
 BORDER = "risorius_border"  # mesh attribute: 1 near an open border, 0 far away
 _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
@@ -49,7 +50,7 @@ class Bucket(NamedTuple):
     """
 
     kind: str  # "flush", "color", "normal" or "bump"
-    number: int = 0  # of the texture set, for "color" and "normal"
+    number: int = 0  # number of the texture set, for "color" and "normal"
     folds: str = ""  # kind of folds for "bump", see animated_maps.FOLDS
 
 
@@ -61,7 +62,7 @@ class Mask(NamedTuple):
 
     kind: str  # "own", "atlas" or "area"
     place: str = ""  # region for "atlas", area for "area"
-    map_index: int = -1  # for "own"
+    map_index: int = -1  # index of the animated map, for "own"
 
 
 class Skin:
@@ -186,6 +187,11 @@ class Skin:
         """The sum of the values of animated maps, multiplied by their common mask.
 
         If the mask is an area, a map of one side of the face affects only this side.
+
+        Args:
+            bucket: the effect of the maps.
+            mask: the common mask.
+            members: side of the face and value of each map.
         """
         graph = self.graph
         if mask.kind == "own":
@@ -273,6 +279,11 @@ class Skin:
         """Mix a colour towards the colour texture of a texture set.
 
         If the texture stores differences around 0.5, the differences are added instead.
+
+        Args:
+            color: the colour without this texture set.
+            number: number of the texture set.
+            amount: 0 to 1, how much of the texture is mixed in.
         """
         graph = self.graph
         picture = graph.image(self.look.image(f"color:{number}"), label=f"Colour {number}")
@@ -354,7 +365,8 @@ class Skin:
         """The normal from the normal textures; None if there are none.
 
         The normals of the texture sets are mixed into the normal of the base texture; the
-        amount of each set is its factor.
+        amount of each set is its factor. If a texture stores differences around 0.5, the scaled
+        differences are added instead.
         """
         graph, look = self.graph, self.look
         base = look.image("normal", data=True)

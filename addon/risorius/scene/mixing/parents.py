@@ -46,6 +46,10 @@ def read(path: str) -> native.Dna:
 
     Args:
         path: absolute path of the file.
+
+    Raises:
+        DnaError: the file is not a DNA file.
+        OSError: the file cannot be read.
     """
     stat = Path(path).stat()
     stamp = (stat.st_mtime, stat.st_size)
@@ -109,7 +113,12 @@ class _Seen:
         return out
 
     def points(self, shares: Sequence[float], regions: Regions) -> NDArray[np.float64]:
-        """float64[V, 3]: vertices of the mix, in Blender's axes and units."""
+        """float64[V, 3]: vertices of the mix, in Blender's axes and units.
+
+        Args:
+            shares: share of each parent; only their ratios count.
+            regions: region -> index of a parent -> share, 0 to 1, for regions with separate shares.
+        """
         mixing = native.part("mixing")
         places = mixing.Places(self.parents, mixing.Mix(list(shares), regions), self.masks)
         rows = [
@@ -197,11 +206,11 @@ def write(
         paths: paths of matching parents.
         shares: share of each parent.
         regions: region -> index of a parent in `paths` -> share, for regions with separate shares.
-        progress: called with the finished share, 0 to 1.
+        progress: function that is called with the progress, 0 to 1.
 
     Returns:
-        Textures taken unmixed from the parent with the largest share -> reason, a key of
-        mixing.textures.WHY.
+        File name of a texture taken unmixed from the parent with the largest share -> reason, a
+        key of mixing.textures.WHY.
 
     Raises:
         MixError: the new file is one of the parents.

@@ -19,12 +19,13 @@ from ..base import parts, session
 from ..base.blender_types import ArmatureObject
 from . import displacement, present
 
-Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joint deltas, channel weights
-_LEAST = 1e-3  # millimetres; less is float32 rounding of a head 1.7 m above the origin
+Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # deltas [J, 9], weights [B]
+_LEAST = 1e-3  # mm; smaller motions are float32 rounding of a head at 1.7 m height
 _MOST_FIRING = 24  # correctives whose motion is computed: those with the largest values
-# Session uid of a deforming armature -> last result of `of_vertex`.
+# Session uid of a deforming armature -> causes of the last examined vertex.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
-# Session uid of a deforming armature -> (inputs of `strongest`, its last result).
+# Session uid of a deforming armature -> ((id of its Runtime, raw controls, LOD) of a pose, the
+# strongest correctives of this pose).
 _fired: dict[int, tuple[object, list[Cause]]] = session.table("causes.fired", ("undo", "load"))
 
 
@@ -71,13 +72,13 @@ class Found:
 
 @dataclass(frozen=True)
 class Part:
-    """A corrective that has a given control as a factor.
+    """A corrective or RBF pose that has a given control as a factor or input.
 
     Attributes:
-        control: index of the corrective.
+        control: index of the corrective or of the pose's output.
         name: its name in lists.
         value: its current value.
-        others: (name, value) of its other factors.
+        others: (name, value) of its other factors or inputs.
     """
 
     control: int
@@ -87,8 +88,9 @@ class Part:
 
 
 def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
-    """Find the causes of a vertex's motion in the current pose and store them for `last`. Returns
-    None if the face has no current pose, see present.of.
+    """Find the causes of a vertex's motion in the current pose and store them for `last`.
+
+    None if the character is baked, or its data or controls are lost.
 
     Args:
         rig: deforming armature.
@@ -139,12 +141,16 @@ def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
 
 
 def last(rig: ArmatureObject) -> Found | None:
-    """The last result of `of_vertex`. Args: rig deforming armature."""
+    """The stored causes of the last examined vertex; None if no vertex was examined.
+
+    Args:
+        rig: deforming armature.
+    """
     return _found.get(rig.session_uid)
 
 
 def firing(now: present.Present) -> list[int]:
-    """Indices of firing (not 0) correctives, network outputs and poses, largest values first.
+    """Indices of firing (not 0) correctives, network and pose outputs, largest magnitude first.
 
     Args:
         now: the face in its current pose.
@@ -222,7 +228,13 @@ def strongest(rig: ArmatureObject, count: int = 8) -> list[Cause]:
 
 
 def is_known(rig: ArmatureObject) -> bool:
-    """Whether `strongest` is computed for the current pose. Args: rig  deforming armature."""
+    """Whether the strongest correctives of the current pose are already computed.
+
+    True too if the face has no current pose.
+
+    Args:
+        rig: deforming armature.
+    """
     now, kept = present.of(rig), _fired.get(rig.session_uid)
     return now is None or (
         kept is not None and kept[0] == (id(now.live), now.raw.tobytes(), now.lod)
@@ -230,7 +242,11 @@ def is_known(rig: ArmatureObject) -> bool:
 
 
 def known(rig: ArmatureObject) -> list[Cause]:
-    """The last result of `strongest`, perhaps for an earlier pose. Args: rig deforming armature."""
+    """The last computed strongest correctives, perhaps of an earlier pose; empty if there are none.
+
+    Args:
+        rig: deforming armature.
+    """
     return list(_fired.get(rig.session_uid, (None, []))[1])
 
 
@@ -253,11 +269,11 @@ def _strongest(rig: ArmatureObject, now: present.Present) -> list[Cause]:
 
 
 def parts_of(rig: ArmatureObject, control: int) -> list[Part]:
-    """The correctives that have a control as a factor, firing ones first.
+    """The correctives and RBF poses that have a control as a factor or input, largest values first.
 
     Args:
         rig: deforming armature.
-        control: index of the raw control.
+        control: index of the control, in raw | corrective | network | pose.
     """
     now = present.of(rig)
     if now is None:
@@ -310,7 +326,7 @@ def control_of(rig: ArmatureObject, label: str) -> int:
 
 
 def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
-    """The vertex of a mesh nearest to a position in the current pose; -1 if there is none.
+    """The vertex of a mesh nearest to a position in the current pose; -1 if there is no pose.
 
     Args:
         rig: deforming armature.

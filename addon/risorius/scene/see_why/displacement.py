@@ -194,7 +194,8 @@ def distances(
     Args:
         live: Runtime of the character.
         mesh: index of the mesh in the DNA file.
-        one, other: (joints, shapes) of each pose, see `vertices`.
+        one, other: float32[J, 9] deltas of the joints and float32[B] weights of the blend shape
+            channels, for each pose.
     """
     apart = vertices(live, mesh, *one) - vertices(live, mesh, *other)
     return np.linalg.norm(apart, axis=1)

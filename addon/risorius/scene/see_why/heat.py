@@ -38,8 +38,7 @@ KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
 _LEAST = 0.01  # lower limit of the millimetres of the hottest colour, so that noise looks cold
 # Session uid of a deforming armature -> values from which its colours were computed.
 _shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
-# Session uid of a deforming armature -> (kind, what) of the heat map that is removed during a save,
-# see Heat.
+# Session uid of a deforming armature -> `kind` and `what` of the Heat that is removed for a save.
 _held: dict[int, tuple[str, str]] = session.table("heat.held", ("load",))
 _PAUSE = 0.15  # seconds, at least, between two checks whether the pose has changed
 
@@ -52,7 +51,7 @@ class Heat:
         kind: CONTROL: motion of a control from rest to 1; POSE: distance of the current pose from
             neutral; CORRECTIVE, LAYER: motion that one corrective or layer adds to the pose.
         what: label of the control, index of the corrective, or index of the layer.
-        most: motion in millimetres that gets the hottest colour.
+        most: largest motion in millimetres; it gets the hottest colour if it is 0.01 or more.
     """
 
     kind: str
@@ -61,7 +60,7 @@ class Heat:
 
 
 def of(rig: ArmatureObject) -> Heat | None:
-    """The heat map that a character shows. Args: rig  its deforming armature."""
+    """The heat map that a character shows, or None. Args: rig  the deforming armature."""
     kind, *rest = saved.text(rig, parts.HEAT).split("\n", 2)
     try:
         most, what = float(rest[0]), rest[1]
@@ -71,15 +70,20 @@ def of(rig: ArmatureObject) -> Heat | None:
 
 
 def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Heat:
-    """Colour the meshes of a character.
+    """Colour the meshes of a character, and let the 3D views show the colours.
+
+    The choice is stored on the deforming armature, and a timer updates the colours from then on.
 
     Args:
         rig: its deforming armature.
-        kind, what: see Heat.
+        kind: "CONTROL", "POSE", "CORRECTIVE" or "LAYER".
+        what: label of the control, index of the corrective, or index of the layer; not used for
+            "POSE".
         depsgraph: graph for reading layers.
 
     Raises:
-        FaceError: the control, corrective or layer does not exist, or nothing can be coloured.
+        FaceError: the character is baked or incomplete, the control, corrective or layer does not
+            exist, or no mesh can be coloured.
     """
     now = present.of(rig)
     if now is None:
@@ -119,7 +123,16 @@ def _is_as_imported(item: MeshObject, count: int) -> bool:
 def _distances(
     rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
 ) -> dict[int, NDArray[np.float64]]:
-    """Index of a mesh -> distances of its vertices between the poses of `_pair`, Blender units."""
+    """Index of a mesh -> float64[V], distances that the heat map shows, in Blender units.
+
+    Args:
+        rig: deforming armature.
+        now: the face in its current pose.
+        kind: "CONTROL", "POSE", "CORRECTIVE" or "LAYER".
+        what: label of the control, index of the corrective, or index of the layer; not used for
+            "POSE".
+        depsgraph: graph for reading layers.
+    """
     one, other = _pair(rig, now, kind, what, depsgraph)
     meshes = displacement.meshes_at(rig, now.lod)
     return {m: displacement.distances(now.live, m, one, other) for m in meshes}
@@ -128,7 +141,16 @@ def _distances(
 def _pair(
     rig: ArmatureObject, now: present.Present, kind: str, what: str, depsgraph: Depsgraph
 ) -> tuple[causes.Poses, causes.Poses]:
-    """The two poses whose difference a heat map shows."""
+    """The two poses whose difference a heat map shows.
+
+    Args:
+        rig: deforming armature.
+        now: the face in its current pose.
+        kind: "CONTROL", "POSE", "CORRECTIVE" or "LAYER".
+        what: label of the control, index of the corrective, or index of the layer; not used for
+            "POSE".
+        depsgraph: graph for reading layers.
+    """
     evaluate = now.live.rig.evaluate
     if kind == "CONTROL":
         if what not in now.live.labels:
@@ -223,7 +245,11 @@ def take_away() -> None:
 
 
 def give_back(depsgraph: Depsgraph) -> None:
-    """Restore the heat maps that `take_away` removed. Args: depsgraph  graph to read layers."""
+    """Restore the heat maps that `take_away` removed.
+
+    Args:
+        depsgraph: graph from which animation layers are read.
+    """
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)
         if kept is not None:
@@ -254,7 +280,9 @@ def follow_undo() -> None:
 
 
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
-    """Update the colours of a character if its pose has changed. Returns: whether the pose changed.
+    """Update the colours of a character if its pose, LOD, solo or mute changed.
+
+    The colours of a CONTROL depend on the LOD alone. Returns: whether an update was necessary.
 
     Args:
         rig: its deforming armature, with a heat map.
@@ -282,7 +310,8 @@ def watch() -> None:
 
 def _look() -> float | None:
     """Called by the timer: update the colours of changed poses. The pause is at least three times
-    the duration of the update, so that updates take at most a quarter of the time."""
+    the duration of the update, so that updates take at most a quarter of the time. Returns: seconds
+    until the next call; None ends the timer."""
     begin = perf_counter()
     shown = [rig for rig in parts.rigs() if parts.HEAT in rig]
     if not shown:
@@ -302,7 +331,7 @@ def title(rig: ArmatureObject, heat: Heat, called: Callable[[str], str] = str) -
     Args:
         rig: deforming armature of the face.
         heat: its heat map.
-        called: returns the label of a control or corrective.
+        called: function that returns the label of a control or corrective from its name.
     """
     if heat.kind == "POSE":
         return told("Moved from Neutral")

@@ -37,7 +37,7 @@ class Row(NamedTuple):
             words; "" if it was not recognised.
         is_known: whether the name of the key is known, regardless of the user's assignment.
         is_said: whether the user assigned the key.
-        holder: another key with the same assignment; "" for none.
+        holder: of an OWN key, the other key that has the control that this key means; "" for none.
     """
 
     key: str
@@ -74,7 +74,11 @@ def of(item: MeshObject) -> Names:
 
 
 def said_of(item: MeshObject) -> dict[str, Said]:
-    """The user's assignments: name of the key -> assignment. Args: item any mesh."""
+    """The user's assignments: name of the key -> assignment.
+
+    Args:
+        item: any mesh object; without assignments the result is empty.
+    """
     return dict(_parsed(saved.text(item.data, parts.NAMES)))
 
 

@@ -27,7 +27,7 @@ from . import assigned
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-VERSION = 2  # of the drawing style; pictures of another version are drawn again
+VERSION = 2  # version of the drawing style; pictures of another version are drawn again
 _SKIN = np.array([0.62, 0.60, 0.58])
 _CLAY = 0.82  # factor of the sample man's colours, which are plain clay
 _MOVED = np.array([0.95, 0.45, 0.10])
@@ -90,7 +90,10 @@ def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
 
 
 def model_of(item: MeshObject) -> Model:
-    """Read the data for the pictures of a head. Args: item mesh with shape keys."""
+    """Read the data for the pictures of a head, and store the paths for `paths_of`.
+
+    Args: item  mesh with shape keys.
+    """
     keys, mesh = parts.keys_there(item), item.data
     turn = np.array(item.matrix_world.to_3x3(), np.float64)
 
@@ -149,6 +152,10 @@ def _to_front(rest: Floats, far: Floats) -> Floats:
     towards -y.
 
     A face moves at its front, so this works for every orientation of the head.
+
+    Args:
+        rest: float64[V, 3], vertices of the neutral head, z up.
+        far: float64[V], from _shares.
     """
     middle = (rest.min(axis=0) + rest.max(axis=0)) / 2
     way = (far[:, None] * (rest - middle)).sum(axis=0)[:2]
@@ -161,7 +168,12 @@ def _to_front(rest: Floats, far: Floats) -> Floats:
 
 
 def _frame(rest: Floats, far: Floats) -> tuple[Floats, float]:
-    """The centre and half the height of a picture that shows all moving vertices."""
+    """The centre and half the height of a picture that shows all moving vertices.
+
+    Args:
+        rest: float64[V, 3], vertices of the neutral head, which faces -y.
+        far: float64[V], from _shares.
+    """
     low, high = rest.min(axis=0), rest.max(axis=0)
     moved = rest[far > _MOVES]
     least = _LEAST * float((high - low)[[0, 2]].max()) / 2
@@ -179,7 +191,7 @@ def draw(model: Model, key: str) -> Floats:
         key: name of the key.
 
     Returns:
-        The picture, see portrait.draw.
+        float64[portrait.SIZE, portrait.SIZE, 3] in [0, 1], row 0 at the bottom.
     """
     way = model.ways[key].astype(np.float64)
     length = np.linalg.norm(way, axis=1)
@@ -204,7 +216,11 @@ def _marked(colors: Floats, length: Floats, triangles: Ints, furthest: float) ->
 
 
 def sample_path(value: str) -> Path:
-    """The picture file of a possible assignment. Args: value of an assigned.Choice."""
+    """The picture file of a possible assignment.
+
+    Args:
+        value: the member `value` of an assigned.Choice.
+    """
     shown = sorted(assigned.weights_of(value).items())  # jawOpen and =jawOpen are one picture
     text = f"sample {VERSION} {portrait.VERSION} {native.addon_version()} {shown}"
     return _file(_digest(text.encode()))
@@ -234,7 +250,13 @@ def sample_sitter() -> portrait.Sitter | None:
 
 
 def _draw_sample(sitter: portrait.Sitter, rest: Sequence[Floats], value: str) -> Floats:
-    """Draw the sample man with an assignment. Args: rest portrait.places of the neutral face."""
+    """Draw the sample man with an assignment; moving parts are orange.
+
+    Args:
+        sitter: the sample man.
+        rest: portrait.places of his neutral face.
+        value: the member `value` of an assigned.Choice.
+    """
     placed = portrait.places(sitter, assigned.weights_of(value))
     lengths = [np.linalg.norm(a - b, axis=1) for a, b in zip(placed, rest, strict=True)]
     furthest = max(float(length.max(initial=0.0)) for length in lengths)
@@ -250,12 +272,12 @@ def make(
     progress: Callable[[float], None] = lambda _share: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Draw missing pictures and write their files, without using Blender data.
+    """Draw the pictures of a job and write their files, without using Blender data.
 
     Args:
         job: pictures to draw.
-        progress: called with the finished share, 0 to 1.
-        cancelled: returns whether to stop.
+        progress: function that is called with the progress, 0 to 1.
+        cancelled: function that returns whether to stop.
 
     Returns:
         The number of drawn pictures.

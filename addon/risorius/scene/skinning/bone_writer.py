@@ -97,8 +97,9 @@ def pose_of(
     """The values of the bones that the evaluator writes.
 
     Args:
-        writer: see writer_of.
-        deltas, turns: see `write`.
+        writer: the Writer of the armature.
+        deltas: float32[J, 9] of a Pose.
+        turns: "neck" and "head" -> additional Quaternion in the armature's axes.
 
     Returns:
         "location", "rotation_quaternion", "scale" -> float32[n, width].

@@ -29,7 +29,7 @@ _late: dict[int, set[Key]] = session.table("caches.late", ("load",))
 
 
 def of_scene(scene: bpy.types.Scene) -> Iterator[tuple[Key, bpy.types.PointCache]]:
-    """The point caches of a scene's cloth, soft bodies, particles, paint and rigid bodies."""
+    """(Key, cache) of a scene's cloth, soft bodies, particles, paint and rigid bodies."""
     for item in scene.objects:
         for modifier in item.modifiers:
             for number, cache in enumerate(_of_modifier(modifier)):
@@ -61,7 +61,7 @@ def _baked(scene: bpy.types.Scene) -> set[Key]:
 
 
 def any_simulates() -> bool:
-    """Whether this file has a simulation with a cache, on any object or in any scene."""
+    """Whether this file has rigid bodies, a modifier of SIMULATED, or geometry nodes to bake."""
     if any(scene.rigidbody_world is not None for scene in bpy.data.scenes):
         return True
     for item in bpy.data.objects:

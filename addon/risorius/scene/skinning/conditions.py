@@ -22,7 +22,7 @@ from . import live_keys, skins
 
 _PLACES = ("location", "rotation", "scale", "delta")  # beginnings of data paths of a transform
 _STRAIGHT = 1e-6  # difference of a matrix element from which a mesh counts as moved from its rig
-_PLAIN = (True, False, False, False, "")  # settings of the armature modifier, see _settings
+_PLAIN = (True, False, False, False, "")  # unedited settings of a mesh's armature modifier
 _FOREIGN_KINDS = (bpy.types.Object, bpy.types.NodeTree, bpy.types.Collection)
 
 
@@ -71,7 +71,8 @@ _told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "l
 _restored = session.value("conditions.restored", False, ("load",))
 # Datablock that is no object -> number of its drivers when it was last updated.
 _drivers: dict[int, int] = session.table("conditions.drivers", ("undo", "load"))
-# The user's objects -> their references, see _pointed.
+# Object outside of characters -> its parent, the targets of its constraints and modifiers, and the
+# number of its drivers, when it was last updated.
 _pointing: dict[int, tuple[object, ...]] = session.table("conditions.pointing", ("undo", "load"))
 # Deforming armature -> number of nested calls of hold_ordinary.
 _ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
@@ -250,7 +251,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
         depsgraph: dependency graph with the updates of the edit.
 
     Returns:
-        Session uids of meshes edited by anyone but this add-on.
+        Session uids of meshes edited by anyone but this add-on; empty after undo and redo.
     """
     edits = _Edits(_told.get(_key_of(depsgraph), 0))
     for update in depsgraph.updates:
@@ -312,7 +313,11 @@ def look_at_tagged(scene: bpy.types.Scene) -> None:
 
 
 def stale(rig: ArmatureObject) -> bool:
-    """Whether the plan of a face is outdated. Args: rig deforming armature."""
+    """Whether the plan of a face is outdated; False if there is no plan.
+
+    Args:
+        rig: the deforming armature.
+    """
     kept = _kept.get(rig.session_uid)
     return kept is not None and not kept.is_fresh
 
@@ -477,7 +482,7 @@ def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModi
 
     Returns:
         In Direct mode the modifier that the add-on disabled, even if the user has changed its
-        object; otherwise the first armature modifier of this rig.
+        object; otherwise the first armature modifier of this rig; None if there is none.
     """
     marked = saved.whole(item, parts.FINISHED, 0)
     own = None

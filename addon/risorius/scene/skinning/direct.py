@@ -76,7 +76,8 @@ class _Face:
     Attributes:
         face: compiled skinning of all meshes in Direct mode.
         skins: session uid of a mesh object -> its Skin, in the order of the meshes in `face`.
-        bones, writer: see Frame.
+        bones: bones of the deforming armature.
+        writer: bone_writer.Writer of the bones that the evaluator writes.
     """
 
     face: native.DirectFace
@@ -182,7 +183,8 @@ def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | No
     """float32[V, 3]: positions of a mesh after its blend shapes and before skinning.
 
     In LIVE mode, in which the armature modifier deforms the mesh, the live shape key has these
-    positions. None if the mesh has no shape keys.
+    positions. None if the mesh has no shape keys; the neutral mesh if no pose was shown, or if the
+    DNA file has another number of vertices.
 
     Args:
         item: the mesh object.
@@ -218,7 +220,9 @@ def _forget(item: MeshObject) -> None:
 
 
 def shown(rig: ArmatureObject) -> Frame | None:
-    """The last shown Frame of a face; None if none of its meshes is in Direct mode.
+    """The last Frame that `prepare` stored for a face, even if Direct mode has ended since.
+
+    None if there is none since the file was opened or since undo.
 
     Args:
         rig: deforming armature.
@@ -274,7 +278,7 @@ def write(jobs: Sequence[Job]) -> None:
     """Write final vertex positions to the live shape keys of all given faces together.
 
     Args:
-        jobs: see `prepare`.
+        jobs: the faces, one Job for each.
     """
     targets = [_addresses(job.items) for job in jobs]
     done = native.module().deform_faces(

@@ -30,6 +30,9 @@ def write(
 ) -> None:
     """Write the sum of all blend shape channels to the live key of a mesh, if it has one.
 
+    Channels with a shape key of their own (parts.REAL) are left out. Nothing is written in edit
+    mode, or if the number of vertices differs from the DNA file.
+
     Args:
         item: the mesh object.
         live: the Runtime of its character.

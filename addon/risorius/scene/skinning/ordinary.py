@@ -24,6 +24,8 @@ _finished: dict[int, NDArray[np.float32]] = session.table("ordinary.finished", (
 def take_on(rigs: Iterable[ArmatureObject]) -> None:
     """Give faces the ordinary form before a file is written, without an evaluation.
 
+    The positions in Direct mode are kept, so that `take_off` can restore them.
+
     Args:
         rigs: deforming armatures.
     """

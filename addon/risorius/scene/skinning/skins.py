@@ -17,7 +17,7 @@ from ..base import parts, saved, session
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import meshes, runtime
 
-_SAMPLES = 16  # vertices, about, whose weights are compared to see whether undo changed a mesh
+_SAMPLES = 16  # approximate number of vertices compared to see whether undo changed a mesh
 
 
 @dataclass
@@ -70,7 +70,7 @@ _edited: set[int] = session.keep("skins.edited", set, ("load",))
 
 @session.at("undo")
 def doubt() -> None:
-    """Make `of` compare each kept skin with its mesh before the next use.
+    """Have each cached skin compared with its mesh at its next use, because undo may change meshes.
 
     Meshes that were not edited since the file was opened need no comparison.
     """
@@ -175,8 +175,12 @@ _Weights = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
 
 
 def _weights_of_file(item: MeshObject, bones: Bones, live: runtime.Runtime) -> _Weights:
-    """The same result as _weights_of_groups, read from the DNA for a mesh whose weights are
-    unedited."""
+    """The skin weights of a mesh without edited weights, read from the DNA.
+
+    Returns:
+        int64[V] number of weights of each vertex; int64[N] index of the pose bone of each weight,
+        -1 for none; float32[N] the weights.
+    """
     data = live.dna.meshes[item[parts.MESH]]
     place_of = np.full(len(live.rest), -1, np.int64)
     place_of[list(bones.joints)] = list(bones.joints.values())

@@ -57,7 +57,7 @@ class Spoken(Protocol):
     """The members of RISORIUS_PG_spoken."""
 
     sounds: Rows
-    active: int
+    active: int  # index of the chosen sound
     start: float
     """Frame of the clip's first sample."""
     end: float
@@ -66,10 +66,10 @@ class Spoken(Protocol):
     """Frames per second of the scene when the action was made."""
     rate: float
     """Samples per second of the clip."""
-    samples: int
-    whole: bool
-    tolerance: float
-    intensity: float
+    samples: int  # number of samples of the clip
+    whole: bool  # whether keys are on whole frames only
+    tolerance: float  # largest difference of a slider from the clip; 0: a key for each sample
+    intensity: float  # strength of mouth and brows with which the clip was made
     openness: str
     """Value of this name in the metadata of a correctable clip."""
     built: str
@@ -81,7 +81,7 @@ class Spoken(Protocol):
 
 
 def of(action: bpy.types.Action) -> Spoken:
-    """The voice of an action. Args: action  any; without a voice the list of sounds is empty."""
+    """The voice of an action; if the action has none, the list of sounds is empty."""
     return cast(Spoken, getattr(action, PROPERTY))
 
 
@@ -134,7 +134,8 @@ def change(action: bpy.types.Action, sounds: Sequence[Sound]) -> int:
         The number of curves with new keys.
 
     Raises:
-        SpokenError: see rebuild; the list is then unchanged.
+        SpokenError: the voice cannot be corrected, and its list is unchanged; or `sounds` is empty
+            or not in the order of time, and the list is already replaced.
     """
     _check(action)
     _fill(of(action), sounds)
@@ -182,7 +183,8 @@ def rebuild(action: bpy.types.Action) -> int:
         The number of curves with new keys.
 
     Raises:
-        SpokenError: the list is damaged, or no slider of the mouth has keys in this action.
+        SpokenError: the action has no voice or is linked, the list is damaged, or no slider of the
+            mouth has keys in this action.
     """
     curves = _check(action)
     said, old, new = of(action), _built(action), sounds_of(action)
@@ -249,8 +251,8 @@ def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
         raise SpokenError(
             told(
                 (
-                    "{action} moves no slider of the mouth: if the face board moves the "
-                    "face, the keys of the voice are on the handles of the board"
+                    "the voice of {action} cannot be corrected: the action has no keys for "
+                    "sliders of the mouth, perhaps because the keys are on the face board"
                 ),
                 action=action.name,
             )
@@ -321,7 +323,15 @@ def _replace(
     name: str,
     span: tuple[float, float],
 ) -> None:
-    """Replace the keys between the last key before and the first key after a span of frames."""
+    """Replace the keys between the last key before and the first key after a span of frames.
+
+    Args:
+        curve: the F-curve of a slider.
+        mouth: computes the values of the control.
+        sounds: the sounds of the voice.
+        name: name of the control.
+        span: first and last frame of the action at which the values change.
+    """
     points = curve.keyframe_points
     at = clip_actions.key_points(curve)[0].astype(np.float64)
     before = int(np.searchsorted(at, span[0] - _BESIDE)) - 1
@@ -354,7 +364,15 @@ def _samples(
     name: str,
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
-    """Frames and values of a control in a span of frames, with the curve's values at both ends."""
+    """Frames and values of a control in a span of frames, with the curve's values at both ends.
+
+    Args:
+        curve: the F-curve of the control's slider.
+        mouth: computes the values of the control.
+        sounds: the sounds of the voice.
+        name: name of the control.
+        span: first and last frame of the action.
+    """
     first, last = int(mouth.sample(span[0])), int(np.ceil(mouth.sample(span[1])))
     first, last = max(first - 1, 0), min(last + 2, mouth.said.samples)
     frames = mouth.frames(np.arange(first, last))
@@ -375,7 +393,13 @@ def _turn(
     left: Floats | None = None,
     right: Floats | None = None,
 ) -> None:
-    """Set the handle of a key that points into the replaced span; its other handle is unchanged."""
+    """Set the handle of a key that points into the replaced span; its other handle is unchanged.
+
+    Args:
+        key: the key.
+        bent: True: Bezier interpolation; False: linear.
+        left, right: new position of the handle, frame and value; None: unchanged.
+    """
     kept = key.handle_left[:], key.handle_right[:]
     if bent:
         key.handle_left_type = key.handle_right_type = "FREE"

@@ -50,7 +50,12 @@ def _board(scene: bpy.types.Scene) -> tuple[str, Board]:
 
 
 def are_shown(scene: bpy.types.Scene, action: bpy.types.Action) -> bool:
-    """Whether the markers of a voice are shown in a scene. Args: action  with the voice."""
+    """Whether the markers of a voice are shown in a scene.
+
+    Args:
+        scene: the scene.
+        action: the action with the voice.
+    """
     voice = _board(scene)[0]
     return bool(voice) and voice == spoken_keys.of(action).mark
 

@@ -40,6 +40,7 @@ def _played(controls: ArmatureObject) -> Iterator[bpy.types.Action]:
 def placing(controls: ArmatureObject, action: bpy.types.Action) -> Placing:
     """The mapping from frames of an action to frames of the scene.
 
+    Frames stay unchanged if the action is the active action, or if no layer or NLA strip plays it.
     Repeats of a layer are ignored. If a layer has warp points, the mapping is the line through the
     first and the last warp point.
 

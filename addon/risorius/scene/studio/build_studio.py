@@ -52,7 +52,8 @@ def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.
 
 def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]:
     """World matrix, without scale, of the midpoint between the eyes; distance between the eyes; low
-    and high corner of the face's bounding box in the space of this matrix."""
+    and high corner of the face's bounding box in the space of this matrix. If the meshes include a
+    neck, the low corner is raised to the height from `_hem`."""
     meshes = parts.meshes_of(rig)
     world = np.array(rig.matrix_world, np.float64)
     eyes = _eyes(rig)
@@ -167,7 +168,12 @@ def _backdrop(name: str, plan: studio_plan.Studio, place: Matrix) -> bpy.types.O
 
 
 def _paper(name: str, glow: float) -> bpy.types.Material:
-    """An emissive dark material with a lighter middle that falls off smoothly."""
+    """An emissive dark material with a lighter middle that falls off smoothly.
+
+    Args:
+        name: name of the material.
+        glow: distance from the middle in Blender units at which the brightness has fallen to 1/e.
+    """
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree

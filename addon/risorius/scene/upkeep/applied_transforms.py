@@ -25,7 +25,7 @@ from ..base.blender_types import ArmatureObject, MeshObject
 
 _NEAR = 1e-5  # relative rounding error of products in float32
 _FLAT = 1e-12  # smallest determinant of a matrix that can be inverted
-_SAMPLES = 4  # vertices of a mesh, about, that are compared to see whether its data changed
+_SAMPLES = 4  # approximate number of vertices compared to see whether a mesh changed
 _BY_HAND = ("EDIT", "SCULPT")  # modes in which the user moves points
 
 
@@ -65,7 +65,7 @@ _said: dict[int, Sentence] = session.table("applied_transforms.said", ("undo", "
 
 
 def last_said(rig: ArmatureObject) -> Sentence | None:
-    """The sentence about the last undone step of a face. Args: rig  deforming armature."""
+    """The sentence about the last undone step, or None. Args: rig  the face's armature."""
     return _said.get(rig.session_uid)
 
 
@@ -118,7 +118,13 @@ def _take_back(rig: ArmatureObject, touched: AbstractSet[bpy.types.ID]) -> bool:
 
 
 def _see(item: bpy.types.Object, before: _Seen | None, touched: AbstractSet[bpy.types.ID]) -> _Seen:
-    """The current state of a part; points are read only if the update reports a change."""
+    """The current state of a part; points are read only if the update reports a change.
+
+    Args:
+        item: the part, or a child of a part.
+        before: the state at the last check; None: read all.
+        touched: the datablocks of the update.
+    """
     if before is not None and item not in touched:
         return before
     parent, data = item.parent.session_uid if item.parent is not None else 0, item.data
@@ -152,8 +158,13 @@ def _read(items: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.float32
 
 
 def _followed(rig: ArmatureObject) -> dict[bpy.types.Object, Matrix]:
-    """World matrices of rig and controls when the rig last followed the controls; stored states can
-    be older, because frame changes cause no update."""
+    """World matrices of rig and controls when the rig last followed the controls.
+
+    Other stored states can be older, because frame changes cause no update.
+
+    Objects with a parent or a constraint are left out. Empty for a baked character, or if the rig
+    has not followed yet.
+    """
     controls, kept = parts.controls_of(rig), last_written.places.get(rig.session_uid)
     if not isinstance(kept, bytes) or parts.BAKED in rig:
         return {}
@@ -171,7 +182,13 @@ def _places(
     known: Mapping[bpy.types.Object, Matrix],
 ) -> dict[bpy.types.Object, Matrix]:
     """The matrix of each part of a face: world matrix, or matrix relative to a parent object that
-    does not belong to the face."""
+    does not belong to the face.
+
+    Args:
+        rig: deforming armature of the face.
+        seen: part -> its state.
+        known: part -> its matrix, which replaces the matrix of the state.
+    """
     found = {item: known.get(item, _local(one)) for item, one in seen.items()}
     carried = [i for i in seen if i.parent == rig and i.parent_type == "OBJECT" and rig in found]
     found.update({item: found[rig] @ found[item] for item in carried})
@@ -183,7 +200,13 @@ def _local(seen: _Seen) -> Matrix:
 
 
 def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object]) -> bool:
-    """Undo the changes of one part. Returns whether there were any."""
+    """Undo the changes of one part. Returns whether there were any.
+
+    Args:
+        moved: the part with its state before the step.
+        now: the state after the step.
+        members: the parts of the face.
+    """
     item, before = moved.item, moved.before
     if before.parent != now.parent:
         return False

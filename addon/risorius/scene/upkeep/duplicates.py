@@ -16,7 +16,7 @@ from ..skinning import ordinary
 
 
 def separate_all() -> list[str]:
-    """Give every duplicated character its own data, see `separate`.
+    """Give every duplicated character its own copies of shared data.
 
     Returns:
         Sentences about changes, for a report.

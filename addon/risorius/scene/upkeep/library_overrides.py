@@ -138,7 +138,10 @@ def unlock_shapes(rig: ArmatureObject) -> bool:
 
 
 def trouble(rig: ArmatureObject) -> str:
-    """A sentence about refused writes to an override; empty if none was refused."""
+    """A sentence about refused writes to an override, or about an override that is not editable.
+
+    Empty if there is no such trouble.
+    """
     names = [item.name for item in evaluate.refused(rig)]
     if rig.override_library is not None and rig.override_library.is_system_override:
         names = names or [rig.name]
@@ -151,8 +154,11 @@ def _localize(item: MeshObject, owned: dict[str, bpy.types.Material]) -> None:
     """Copy a mesh into this file, with copies of its override materials.
 
     Without the mesh these materials would be outside the hierarchy of the override, and Blender
-    would delete them when the library changes. Args: owned  override material's name -> copy,
-    filled here.
+    would delete them when the library changes.
+
+    Args:
+        item: the mesh object.
+        owned: name of an override material -> its copy; new copies are added.
     """
     left = [item.data, *item.data.materials]
     item.data = _local_copy(item.data)
@@ -212,7 +218,13 @@ def _unlink(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
 def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.types.ID) -> None:
     """Move an override to the position of an instance of the linked collection.
 
-    The instance then shows nothing, and is deleted if no other datablock uses it.
+    The instance then shows nothing, and is deleted if it has no children and no other datablock
+    uses it.
+
+    Args:
+        shown: the object that shows the instance.
+        rig: deforming armature of the override.
+        collection: not used.
     """
     place = shown.matrix_world.copy()
     shown.instance_collection = None
@@ -225,7 +237,7 @@ def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.ty
 
 
 def _show(context: Context, rig: ArmatureObject) -> None:
-    """Select the controls, as after an import."""
+    """Select only the control armature of a character, and make it active, as after an import."""
     layer, controls = context.view_layer, parts.controls_of(rig)
     compat.deselect_all(layer)
     if controls is not None and controls.name in layer.objects:

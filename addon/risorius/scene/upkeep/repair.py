@@ -18,13 +18,15 @@ from ..character import armatures, build, meshes, runtime
 
 
 def heal(rig: ArmatureObject) -> list[str]:
-    """Restore the names of control bones and sliders of a character.
+    """Restore the names of control bones, and missing sliders or sliders of a wrong type.
+
+    The pointer of the control armature to the rig is restored too.
 
     Args:
-        rig: its deforming armature, which is not linked.
+        rig: the character's deforming armature, which is not linked.
 
     Returns:
-        Sentences about repairs.
+        Sentences about repaired names and missing sliders.
     """
     controls = rig.get(parts.CONTROLS)
     if not isinstance(controls, bpy.types.Object) or controls.type != "ARMATURE":

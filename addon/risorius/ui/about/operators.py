@@ -27,8 +27,10 @@ def describe(rig: ArmatureObject) -> list[str]:
     names = live.dna.blend_shape_channel_names
     lines = [
         words.say(
-            "{controls} controls, {joints} joints, {moved} of them moved by the DNA file, "
-            "{channels} channels, {maps} maps.",
+            (
+                "{controls} controls, {joints} joints, {moved} of them moved by the DNA file, "
+                "{channels} blend shape channels, {maps} animated maps."
+            ),
             controls=len(live.labels),
             joints=live.rig.joint_count,
             moved=len(live.owned),
@@ -46,8 +48,10 @@ def describe(rig: ArmatureObject) -> list[str]:
         ]
         levels = ", ".join(str(level) for level in lods.levels_of(item))
         line = words.say(
-            "{mesh}: level {levels}, {vertices:,} vertices, {channels} channels move it, "
-            "{real} of them as real keys.",
+            (
+                "{mesh}: level {levels}, {vertices:,} vertices, {channels} channels move it, "
+                "{real} of them as real keys."
+            ),
             mesh=item.name,
             levels=levels,
             vertices=len(item.data.vertices),
@@ -57,7 +61,10 @@ def describe(rig: ArmatureObject) -> list[str]:
         lines.append(line)
         if still:
             lines.append(
-                "    " + words.say("These channels move nothing: {names}", names=", ".join(still))
+                "    "
+                + words.say(
+                    "These blend shape channels move nothing: {names}", names=", ".join(still)
+                )
             )
     return lines
 
@@ -126,7 +133,7 @@ class RISORIUS_OT_self_test(Operator):
 
 
 class RISORIUS_OT_hide_hints(Operator):
-    """Hide the first steps; the preferences show them again"""
+    """Hide the first steps; the option First Steps in the preferences shows them again"""
 
     bl_idname = "risorius.hide_hints"
     bl_label = "Hide First Steps"

@@ -55,7 +55,7 @@ class RISORIUS_Preferences(AddonPreferences):
 
     hints: bpy.props.BoolProperty(
         name="First Steps",
-        description="Show the first steps beside a face that was not moved yet",
+        description="Show the hints First Steps in the panel Face until you hide them",
         default=True,
     )
 

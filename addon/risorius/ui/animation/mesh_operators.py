@@ -150,8 +150,8 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
         return [
             words.say(
                 (
-                    "Left over: {mean} mm of distance to the mesh (root mean "
-                    "square), at most {most} mm; the worst frame is {frame}."
+                    "Left over: {mean} mm of distance to the mesh (root mean square), at most "
+                    "{most} mm; the worst frame is {frame}."
                 ),
                 mean=f"{np.sqrt((frames**2).mean()):.3f}",
                 most=f"{solved.largest * mm:.3f}",

@@ -63,7 +63,10 @@ ANGLES = (
     (
         "AUTO",
         "As the File Says",
-        "Radians; angles that no head can turn stop the import with a message",
+        (
+            "Angles are read as radians; if a head cannot turn by such angles, the import "
+            "stops with a message"
+        ),
     ),
     ("RADIANS", "Radians", ""),
     ("DEGREES", "Degrees", ""),

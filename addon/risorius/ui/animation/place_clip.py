@@ -88,13 +88,15 @@ class PlacesClip(FaceOperator):
             notes: first lines of the report.
             with_eyes: True: the eye bones rotate too.
             whole: True: keys are on whole frames only.
-            tolerance: see clip_actions.make_action; 0 keeps all keys.
+            tolerance: largest difference of a slider from the clip after Bezier keys were fitted;
+                0: a linear key for each sample.
 
         Returns:
             The new action.
 
         Raises:
-            ClipError: the NLA is being edited, or no curve of the clip fits this face.
+            ClipError: the face is in the tweak mode of the NLA editor, no curve of the clip fits
+                this face, or frames lie outside of Blender's range.
         """
         rig = face_rig(context)
         trouble = actions.busy(face_controls(context))
@@ -136,7 +138,11 @@ class PlacesClip(FaceOperator):
         return [say("{count} controls were brought to rest.", count=count)]
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """Settings of the layer that plays the clip. Args: context  has the frame rate."""
+        """Settings of the layer that plays the clip; empty unless a subclass overrides this.
+
+        Args:
+            context: context with the scene, which has the frame rate.
+        """
         return {}
 
     def _report_on(self, made: clip_actions.Report, notes: list[str]) -> None:

@@ -123,7 +123,9 @@ def show_found(
 
 
 def hide_lines(context: Context) -> None:
-    """Hide relationship lines, from landmarks to the origin of their head, in the 3D viewports.
+    """Hide relationship lines in the 3D viewports of the window.
+
+    Otherwise Blender draws a line from each landmark to the origin of its head.
 
     Args:
         context: has the window; without a window nothing happens.

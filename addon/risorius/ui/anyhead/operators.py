@@ -145,7 +145,8 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
     levels: bpy.props.IntProperty(
         name="Levels of Detail",
         description=(
-            "Number of levels of detail; each has fewer joints and vertices than the one before"
+            "Largest number of levels of detail; each level has fewer joints and vertices than "
+            "the one before"
         ),
         default=8,
         min=1,
@@ -161,7 +162,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         """The face whose expressions the new rig gets.
 
         Raises:
-            FaceError: there is no such face.
+            FaceError: no file was chosen, or there is no such face.
         """
         if self.template == "FACE":
             rig = heads.face_there(context)

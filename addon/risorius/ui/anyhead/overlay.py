@@ -23,7 +23,8 @@ class Dot(NamedTuple):
 
     Attributes:
         mark: its place in world space, its colour, and its radius in pixels.
-        label: its name in the user's language; "" if the landmark is not selected.
+        label: its name in the user's language; "" if the landmark is not selected, or if Blender
+            draws the name.
     """
 
     mark: Mark

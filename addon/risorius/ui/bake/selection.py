@@ -24,6 +24,9 @@ RANGES = (
 def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]:
     """The deforming armatures of all selected faces, or of the active face if none is selected.
 
+    Faces that lack their control armature or their DNA data are left out, and so are selected
+    linked faces.
+
     Args:
         context: context with the scene and the selection.
         every: True: the armatures of all faces of the scene.
@@ -82,7 +85,7 @@ class FrameRange(OperatorBase):
     )
     lod: bpy.props.IntProperty(
         name="Detail",
-        description="-1 is the level that the viewport shows",
+        description="Level of detail: 0 is the finest, -1 the level that the viewport shows",
         default=-1,
         min=-1,
         max=31,

@@ -100,7 +100,9 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
 
     kind: bpy.props.EnumProperty(
         name="Board",
-        description="Kind of board; it replaces the other kind and keeps the pose",
+        description=(
+            "Kind of the new board; it replaces a board of the other kind, and the pose stays"
+        ),
         items=KINDS,
         options={"SKIP_SAVE"},
     )
@@ -142,7 +144,10 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         return {"FINISHED"}
 
     def _exchange(self, context: Context, rig: ArmatureObject, kind: str) -> int:
-        """Replace the existing board by a board of another kind, and convert pose and keyframes."""
+        """Replace the existing board by a board of another kind, and convert pose and keyframes.
+
+        Returns the number of handles of the new board.
+        """
         done = board_keys.exchange(context, rig, kind)
         lost = board_keys.lost(done.loss)
         if lost is not None:
@@ -287,7 +292,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
 
 
 class RISORIUS_OT_reset_board(_OnBoard, Operator):
-    """Bring sliders of the face board to rest"""
+    """Bring handles of the face board to rest"""
 
     bl_idname = "risorius.reset_board"
     bl_label = "Reset Board"
@@ -302,7 +307,7 @@ class RISORIUS_OT_reset_board(_OnBoard, Operator):
         if self.selected:
             chosen = [h for h in chosen if board.is_selected(controls, h.bone)]
         if not chosen:
-            self.report({"WARNING"}, say("No slider of the board is selected."))
+            self.report({"WARNING"}, say("No handle of the board is selected."))
             return None
         board.reset(controls, chosen)
         live = runtime.there(rig)
@@ -311,7 +316,7 @@ class RISORIUS_OT_reset_board(_OnBoard, Operator):
 
 
 class RISORIUS_OT_select_board(FaceOperator, Operator):
-    """Select the sliders of a region on the face board"""
+    """Select the handles of a region on the face board"""
 
     bl_idname = "risorius.select_board"
     bl_label = "Select on Board"
@@ -335,7 +340,7 @@ class RISORIUS_OT_select_board(FaceOperator, Operator):
         region = "" if self.region == "ALL" else self.region.lower()
         chosen = [handle.bone for handle in board.handles_in(rig, region)]
         board.select(controls, chosen, self.extend)
-        self.report({"INFO"}, say("{count} sliders are selected", count=len(chosen)))
+        self.report({"INFO"}, say("{count} handles are selected", count=len(chosen)))
         return {"FINISHED"} if chosen else {"CANCELLED"}
 
 

@@ -62,7 +62,7 @@ class RISORIUS_PT_board(FaceOnlyPanel, Panel):
         gone = board.missing(controls, live)
         if gone:
             words.write(
-                layout, words.say("{count} sliders of the board are missing.", count=len(gone))
+                layout, words.say("{count} handles of the board are missing.", count=len(gone))
             )
             back = layout.operator("risorius.add_board", text="Bring Back", icon="LOOP_BACK")
             back.kind = live.board

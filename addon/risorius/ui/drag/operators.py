@@ -180,7 +180,11 @@ class RISORIUS_OT_drag(Operator):
         return {"FINISHED"}
 
     def _click(self, context: Context) -> None:
-        """After a press without motion, select the pressed handle, or a bone under the cursor."""
+        """Select after a press without motion.
+
+        A pressed handle is selected. Beside the handles, all handles are deselected, and in pose
+        mode the bone under the cursor is selected.
+        """
         point = {"mesh": self.mesh, "vertex": self.vertex if self._is_handle else -1}
         if self._is_handle or _selected(context, self._held.rig):
             bpy.ops.risorius.select_handle("EXEC_DEFAULT", True, **point)  # pyright: ignore  ours
@@ -247,7 +251,15 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[stroke.Point, ...]
 
 
 def _triangles(rig: ArmatureObject, mesh: int) -> NDArray[np.int32] | None:
-    """The triangles of a mesh, int32[T, 3], or None if its topology differs from the DNA file."""
+    """The triangles of a mesh, int32[T, 3].
+
+    Args:
+        rig: deforming armature of the face.
+        mesh: index of the mesh in the DNA file.
+
+    Returns:
+        None if the mesh is not built, or if its number of vertices differs from the DNA file.
+    """
     item = next((i for i in parts.meshes_of(rig) if i[parts.MESH] == mesh), None)
     live = runtime.of(rig)
     if item is None or live is None or len(item.data.vertices) != pointing.counts_of(live)[mesh]:

@@ -77,7 +77,10 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     fbx_units: bpy.props.EnumProperty(
         name="Units",
-        description="Place in the FBX file that stores the unit",
+        description=(
+            "Place where the FBX file stores the unit: in its settings, or as a scale of the "
+            "objects"
+        ),
         items=(
             ("FBX_SCALE_NONE", "On Objects", "Objects have scale 100, as Unreal expects"),
             ("FBX_SCALE_ALL", "In the File", "Objects have scale 1, as Unity expects"),

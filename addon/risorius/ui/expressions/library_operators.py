@@ -88,7 +88,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
 
     @staticmethod
     def _give_pictures(context: Context) -> None:
-        """Set the new pictures as previews of this face's pose assets."""
+        """Set pictures of this face as previews of all pose assets of expressions in this file."""
         rig = face_rig(context)
         for action in bpy.data.actions:
             expression = library.of_action(action)

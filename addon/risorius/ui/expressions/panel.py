@@ -72,7 +72,7 @@ def _draw_tools(layout: UILayout, chosen: RISORIUS_PG_expressions) -> None:
 
 
 def _chosen(items: list[library.Item], chosen: RISORIUS_PG_expressions) -> list[library.Item]:
-    """The expressions of the chosen category whose names match the search."""
+    """The expressions of the chosen category whose names or texts contain all searched words."""
     sought, group = chosen.search.lower().split(), chosen.category
     starred = library.favourites() if group == STARRED else set()
     found = []

@@ -29,7 +29,7 @@ def icon_of(path: Path) -> int:
 
 
 def load(path: Path) -> int:
-    """Like icon_of, but Blender reads the picture immediately, as search lists need it.
+    """The number of the icon for a picture, or 0; Blender reads the file at once, for search lists.
 
     Args:
         path: path of the picture.

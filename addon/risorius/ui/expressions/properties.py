@@ -91,7 +91,10 @@ class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
     )
     active: bpy.props.StringProperty(name="Expression")
     new_label: bpy.props.StringProperty(
-        name="Name", description="Name of the new expression; empty: a number"
+        name="Name",
+        description=(
+            "Name of the new expression; empty: the word Expression, with a number if needed"
+        ),
     )
     new_group: bpy.props.StringProperty(
         name="Category", description="Category of the new expression", default="own"

@@ -4,7 +4,7 @@
 """An asset shelf with expressions, for versions of Blender whose shelves accept operators.
 
 Blender's own pose shelf applies the same assets only in pose mode and to the selected bones; this
-shelf moves the sliders with any selection, also in object mode.
+shelf appears in object mode and moves the sliders of the active face.
 """
 
 from typing import Any
@@ -80,7 +80,7 @@ class RISORIUS_AST_expressions(bpy.types.AssetShelf):
     def poll(cls, context: bpy.types.Context) -> bool:
         given: Any = context
         if getattr(given, "mode", "") != "OBJECT" or not hasattr(given, "object"):
-            return False  # the context is incomplete while a file opens
+            return False  # while a file opens, the context has no attribute `object`
         return active_controls(given) is not None
 
     @classmethod

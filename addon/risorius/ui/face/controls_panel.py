@@ -120,7 +120,16 @@ def _draw_region_header(layout: UILayout, region: str) -> None:
 
 
 class _Part(NamedTuple):
-    """The sliders of a region and their context; see `draw_sliders` for the fields."""
+    """The sliders of a region and their context.
+
+    Attributes:
+        context: context of the panel.
+        face: the bone with the sliders.
+        region: region of the sliders.
+        names: names of the sliders.
+        followers: following slider -> leading slider.
+        given: slider -> value from the face board.
+    """
 
     context: Context
     face: bpy.types.PoseBone
@@ -208,9 +217,9 @@ def _draw_lines(layout: UILayout, part: _Part, lines: Sequence[slider_rows.Row])
 
 
 def _draw_sides(column: UILayout, linked: bool) -> None:
-    """Draw headings of the columns Left and Right.
+    """Draw headings of the columns Left and Right, or one heading Both Sides if they are linked.
 
-    They replace the letters L and R, for which a slider has no room before its number.
+    The headings replace the letters L and R, for which a slider has no room before its number.
     """
     row = column.split(factor=_TITLE, align=True)
     row.label(text="")

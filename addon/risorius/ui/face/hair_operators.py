@@ -28,7 +28,7 @@ class RISORIUS_OT_set_strands(FaceOperator, Operator):
             return {"FINISHED"}
         unit = runtime.unit_of(rig)
         if not strands.show(rig, unit):
-            self.report({"ERROR"}, say("This face has no cards of hair."))
+            self.report({"ERROR"}, say("This face has no cards of hair that strands could follow."))
             return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -97,8 +97,8 @@ def _draw_hint(layout: UILayout, context: Context) -> None:
     row = box.row()
     words.show(row, words.say("First Steps"), "LIGHT")
     row.operator("risorius.hide_hints", text="", icon="X")
-    words.write(box, "Drag the Face pulls at the skin.")
-    words.write(box, "Key All keys the whole pose at this frame.")
+    words.write(box, "The tool Drag the Face pulls at the skin.")
+    words.write(box, "The button Key All keys the whole pose at this frame.")
 
 
 def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:

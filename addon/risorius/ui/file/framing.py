@@ -17,7 +17,7 @@ from ...scene.lod import lods
 from ..blender_types import Context
 
 _FRONT = Vector((0.0, -1.0, 0.0))  # direction in which an imported face looks
-_THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # from the face to the viewer
+_THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # from the face to the viewer: 21 degrees aside
 _ROWS, _COLUMNS = ("HEADER", "TOOL_HEADER"), ("TOOLS", "UI")  # types of regions that overlap a view
 _SIDE = 0.77  # cosine of 40 degrees: views farther off the front are rotated
 
@@ -25,10 +25,10 @@ _SIDE = 0.77  # cosine of 40 degrees: views farther off the front are rotated
 def frame(context: Context, rig: ArmatureObject) -> None:
     """Frame a face in the 3D views of the user's window.
 
-    A perspective view that is more than 40 degrees off the front rotates to a view from the front.
-    Views through a camera do not change, nor views that already show the face well. A solid view
-    with Blender's default material colours switches to texture colours, which show iris, lips and
-    brows. Undo does not restore views.
+    A perspective view that is more than 40 degrees off the front rotates to a three-quarter view.
+    Views through a camera do not change, nor views locked to an object or the 3D cursor, nor views
+    that already show the face well. A solid view with Blender's default material colours switches
+    to texture colours, which show iris, lips and brows. Undo does not restore views.
 
     Args:
         context: context of Blender; without a window nothing happens.
@@ -127,8 +127,9 @@ def _largest_or_own(context: Context) -> bpy.types.Area | None:
 def _free_part(area: bpy.types.Area, region: bpy.types.Region) -> view_fit.Box:
     """The rectangle of a region that no other region of its area covers.
 
-    Sidebar, toolbar and headers cover a part if the preferences let regions overlap. The rectangle
-    is in pixels from the lower left corner of `region`.
+    Sidebar, toolbar and headers cover a part if the preferences let regions overlap. If they leave
+    nothing free, the whole region is returned. The rectangle is in pixels from the lower left
+    corner of `region`.
     """
     left, bottom, right, top = 0, 0, region.width, region.height
     for other in area.regions:

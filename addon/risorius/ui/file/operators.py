@@ -65,7 +65,7 @@ def _replace(operator: Operator, context: Context, path: str) -> Result:
 
 
 class _FileOperator(FaceOperator):
-    """Base of operators on a face that may lack controls or DNA; the operator restores both."""
+    """Base of operators that accept a face without its control armature or its DNA data."""
 
     whole_face = False
 

@@ -39,7 +39,8 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     levels: bpy.props.IntProperty(
         name="Levels of Detail",
         description=(
-            "Number of levels of detail; each has fewer joints and vertices than the one before"
+            "Largest number of levels of detail; each level has fewer joints and vertices than "
+            "the one before"
         ),
         default=8,
         min=1,
@@ -53,9 +54,9 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
         description=(
-            "Errors of the joints up to this length, in millimetres, are not corrected by "
-            "blend shapes; 0: a share of the head's height. The length is raised if the "
-            "blend shapes would contain more displacements of vertices than those of the head"
+            "Errors of the joints up to this length, in millimetres, are not corrected by blend "
+            "shapes; 0: a share of the head's height. The length is raised if the blend shapes "
+            "would contain more displacements of vertices than the shape keys of the head"
         ),
         default=0.0,
         min=0.0,

@@ -13,13 +13,13 @@ from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls
 
 
-def _preferences(context: Context) -> Any:  # noqa: ANN401  the class lies in a room above
+def _preferences(context: Context) -> Any:  # noqa: ANN401  importing the class would be circular
     addon = context.preferences.addons.get(native.ADDON)
     return addon.preferences if addon is not None else None
 
 
 def favourites_of(context: Context) -> list[str]:
-    """The favourites of the active face."""
+    """The favourites of the active face, or the user's if the face has no list of its own."""
     users = getattr(_preferences(context), "favourites", "")
     return favourites.of(face_controls(context), users)
 

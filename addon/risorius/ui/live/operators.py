@@ -234,7 +234,7 @@ def _finish(
         finish: function that converts; called with the face's armature and the scene.
 
     Returns:
-        Whether an action was made; otherwise the recording is kept.
+        Whether an action was made. After an error, the recording waits to be finished.
     """
     rig = face_rig(context)
     try:

@@ -26,7 +26,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, Panel):
         column.prop(chosen, "everywhere")
         words.write(column, _where(chosen))
         words.prop_or(column, chosen, "mapping", "", "Empty: names of ARKit and VRM")
-        words.prop_or(layout, chosen, "subject", "", "Empty: first subject heard")
+        words.prop_or(layout, chosen, "subject", "", "Empty: the first person received")
         column = layout.column(align=True)
         for name in ("smoothing", "gain", "head_gain"):
             column.prop(chosen, name)

@@ -116,7 +116,7 @@ class RISORIUS_OT_heat(FaceOperator, Operator):
 
     kind: bpy.props.EnumProperty(
         name="Kind",
-        description="Motion that the colours show",
+        description="The kind of motion that the colours show",
         items=(
             ("POSE", "From Neutral", "Distance of the current pose from the neutral pose"),
             (
@@ -124,8 +124,8 @@ class RISORIUS_OT_heat(FaceOperator, Operator):
                 "Reach of a Control",
                 "Motion of the neutral face when one control goes to its full value",
             ),
-            ("CORRECTIVE", "A Corrective", "Share of a corrective in the current pose"),
-            ("LAYER", "A Layer", "Share of a layer in the current pose"),
+            ("CORRECTIVE", "A Corrective", "Motion that a corrective adds to the current pose"),
+            ("LAYER", "A Layer", "Motion that a layer adds to the current pose"),
             ("OFF", "Off", "Remove the colours; views return to their earlier shading"),
         ),
     )

@@ -82,7 +82,9 @@ def _draw_vertex(layout: UILayout, context: Context, rig: ArmatureObject) -> Non
     if found is None:
         return
     column = layout.column(align=True)
-    head = words.say("Vertex {vertex}, {moved:.2f} mm", vertex=found.vertex, moved=found.moved)
+    head = words.say(
+        "Vertex {vertex}: {moved:.2f} mm from neutral", vertex=found.vertex, moved=found.moved
+    )
     words.show(column, head)
     for cause in found.causes[:_ROWS]:
         _draw_cause(column, context, cause, max(found.moved, found.causes[0].now))

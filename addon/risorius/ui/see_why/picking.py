@@ -29,13 +29,13 @@ class RISORIUS_OT_why_vertex(FaceOperator, Operator):
 
     mesh: bpy.props.IntProperty(
         name="Mesh",
-        description="Number of the mesh in the DNA file; -1: the active mesh",
+        description="Number of the mesh in the DNA file, from 0; -1: the active mesh",
         default=-1,
         min=-1,
     )
     vertex: bpy.props.IntProperty(
         name="Vertex",
-        description="Number of the vertex; -1: the first selected vertex",
+        description="Number of the vertex in the mesh, from 0; -1: the first selected vertex",
         default=-1,
         min=-1,
     )
@@ -131,11 +131,15 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
 
 
 def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int, int] | None:
-    """The armature of the face, its mesh and the vertex under the cursor; None without a face.
+    """The face under the cursor: armature, index of the mesh in the DNA file, index of the vertex
+    nearest to the cursor.
 
     Args:
         context: context of Blender.
         event: event with the place of the cursor in the window.
+
+    Returns:
+        None if there is no face under the cursor.
     """
     area = context.area
     if area is None:

@@ -88,9 +88,12 @@ class Says(OfHead):
         return True
 
     def keep(self, context: Context, value: assigned.Said | None) -> Result:
-        """Store an assignment of the key; the value None removes the user's assignment.
+        """Store the user's assignment of the key.
 
-        Args: context  context of Blender; value  the assignment.
+        Args:
+            context: context of Blender.
+            value: the value of an assigned.Choice; [] leaves the key out; None removes the user's
+                assignment.
         """
         item = head_of(context)
         name = self.key or shown.active_key(item)

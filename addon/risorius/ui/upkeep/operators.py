@@ -30,7 +30,10 @@ SHAPES = (
 
 
 def override_trouble(rig: ArmatureObject | None) -> str:
-    """The reason why a face with a library override does not move; "" for other faces."""
+    """The reason why a face with a library override does not move.
+
+    "" if the face moves, has no override, or is None.
+    """
     if rig is None or not rig.override_library:
         return ""
     return library_overrides.trouble(rig)
@@ -44,7 +47,11 @@ class RISORIUS_OT_make_override(Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     shapes: bpy.props.EnumProperty(
-        name="Shapes", description="Mode of the face's shapes", items=SHAPES
+        name="Shapes",
+        description=(
+            "Source of the face's shapes: the library file, or copies of the meshes in this file"
+        ),
+        items=SHAPES,
     )
 
     @classmethod

@@ -20,7 +20,7 @@ from ..base.errors import ArgumentError
 
 _AT_ONCE = 4096  # frames that are resampled at a time
 # Memory that the clip from one read may take, in bytes, in addition to BYTES_PER_BYTE times the
-# file's size. It suffices for 75 minutes of 1,000 controls at 60 frames per second.
+# file's size. This amount suffices for 75 minutes of 1,000 controls at 60 frames per second.
 MOST_BYTES = 1 << 30
 
 Floats = npt.NDArray[np.float32]
@@ -50,7 +50,7 @@ class Clip:
             NaN, -0 and denormals.
         rate: frames per second. For a clip with individual times, the rate that tools should
             propose.
-        start: seconds, the time of the first frame.
+        start: seconds, the time of the first frame; equal to times[0] if there are times.
         times: float64[frames] in seconds, strictly ascending, or None: then frame i is at start + i
             / rate.
         events: events in the order of their times.
@@ -71,8 +71,8 @@ class Clip:
         """Copy the arguments, which the class describes.
 
         Raises:
-            ValueError: a repeated name, a wrong shape, a rate that is not above 0, or times that do
-                not ascend.
+            ValueError: a repeated name, a wrong shape, a rate that is not above 0, a start that is
+                not finite, or times that are not finite or do not ascend.
         """
         self.names: tuple[str, ...] = tuple(names)
         self.curves: Floats = _frozen(np.array(curves, np.float32, order="C"))
@@ -192,10 +192,12 @@ class Clip:
         return self.replaced(curves=self._sampled(times), rate=rate, times=None)
 
     def without_gaps(self) -> Clip:
-        """The clip with evenly spaced frames at its `rate`, from the time of its first frame on.
+        """The clip with evenly spaced frames at its `rate`, from the time of its first frame to the
+        time nearest to its last frame.
 
         Raises:
-            BudgetError: too many frames, see resampled().
+            BudgetError: long gaps between frames would give more frames than the memory budget for
+                a clip of this size allows.
         """
         count = self._even_count(self.rate, 0.5)
         start = float(self.frame_times()[0]) if self.frame_count else self.start
@@ -217,7 +219,8 @@ class Clip:
         return int(np.floor(frames + rounding)) + 1 if self.frame_count else 0
 
     def _longest_step(self) -> str:
-        """The longest gap of the clip, e.g. "frame 1 comes 9 s after frame 0 at 2 s"."""
+        """The longest gap of the clip, e.g. "frame 1 comes 9 s after frame 0 at 2 s"; the number of
+        frames if the frames have no individual times."""
         if self.times is None:
             return f"the clip has {self.frame_count:,} frames at {self.rate:g} a second"
         frame = int(np.argmax(np.diff(self.times)))
@@ -241,7 +244,8 @@ class Clip:
     def replaced(self, **changes: object) -> Clip:
         """The clip with other values for some of its attributes.
 
-        These are names, curves, rate, start, times, events and metadata.
+        Args:
+            changes: new values of names, curves, rate, start, times, events or metadata.
         """
         values: dict[str, object] = {
             "names": self.names,
@@ -292,8 +296,9 @@ class Clip:
             controls: names of the curves to read, in the wanted order; None for all.
 
         Raises:
-            ClipError: not a .rzc file, truncated, damaged or of another version, or it cannot be
-                opened.
+            ClipError: not a .rzc file, truncated, damaged or of another version, it cannot be
+                opened, it lacks some of the frames, or they are more than one read of a file of
+                this size may return.
             KeyError: the file lacks a control.
         """
         return ClipReader(source).read(frames, controls)
@@ -333,7 +338,8 @@ class ClipReader:
         byte_count: bytes of the file that belong to the clip; fewer than the file's size only after
             a recovery.
         block_starts: index of the first frame of each block, and at the end the frame count.
-        events, metadata: events of the clip and facts about it, see Clip.
+        events: events of the whole clip, in the file's order.
+        metadata: facts about the clip, such as source, take and actor.
     """
 
     def __init__(self, source: str | os.PathLike[str] | bytes, *, recover: bool = False) -> None:
@@ -375,8 +381,8 @@ class ClipReader:
         """Read the named controls (None: all) in `frames` (begin, exclusive end; None: all).
 
         Returns:
-            A clip that starts at the time of its first frame. It has the events within its time
-            span; a read of all frames has all events.
+            A clip that starts at the time of its first frame. The clip has the events within its
+            time span; a read of all frames has all events.
 
         Raises:
             ClipError: frames that do not exist, a damaged block, or more frames than one read of a

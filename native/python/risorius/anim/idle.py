@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Makes idle movement from a random seed: blinks, saccades with lids, and subtle motion.
+"""Makes idle movement from a random seed: blinks, saccades that the lids follow, and subtle motion.
 
 Randomness comes from the raw bits of PCG64, which NumPy keeps stable; all other arithmetic is sums,
-products and quotients. So every machine makes the same blinks at the same times.
+products, quotients and square roots, which every machine rounds in the same way. So every machine
+makes the same blinks at the same times.
 """
 
 from __future__ import annotations
@@ -251,6 +252,10 @@ def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
 
     The lid closes fast and opens ever more slowly. `blink.late`, the delay of the right lid, is not
     added.
+
+    Args:
+        blink: the blink.
+        times: seconds on the clock of blink.start.
     """
     t = np.asarray(times, np.float64) - blink.start
     up = np.clip((t - blink.close - blink.hold) / blink.open, 0.0, 1.0)
@@ -261,7 +266,15 @@ def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
 def _close_lids(
     curves: dict[str, Doubles], times: Doubles, blinks: list[Blink], life: Life
 ) -> None:
-    """Set the lid controls of both sides from blinks and from the gaze, which the lids follow."""
+    """Set the lid controls of both sides from blinks and from the gaze, which the lids follow.
+    Each blink also lowers the brow a little.
+
+    Args:
+        curves: control name without prefix -> its curve; changed.
+        times: float64[frames], seconds.
+        blinks: the blinks.
+        life: gives the fraction of the gaze that the lids follow.
+    """
     for side, sign in (("L", 0.0), ("R", 1.0)):
         closed = np.zeros(times.size)
         for blink in blinks:
@@ -279,13 +292,14 @@ def _close_lids(
 
 
 def make_saccades(seed: int, length: float, life: Life, loop: bool) -> list[Saccade]:
-    """Make saccades, sorted by start; each begins where its predecessor ended.
+    """Make saccades, sorted by start; each begins at the gaze direction at which its predecessor
+    ended.
 
     Args:
         seed: 0 or more; the same seed gives the same saccades.
         length: seconds to fill.
         life: range of the gaze; a gaze of 0 gives no saccades.
-        loop: True: the last saccade ends at the direction in which the first one starts.
+        loop: True: the last saccade ends where the first one starts, straight ahead.
     """
     if life.gaze == 0.0:
         return []
@@ -327,7 +341,13 @@ def _beside(dice: _Dice, place: tuple[float, float], degrees: float) -> tuple[fl
 
 def _next_place(dice: _Dice, place: tuple[float, float], scale: float) -> tuple[float, float]:
     """The next gaze direction in degrees. If `place` is far from straight ahead, the next
-    direction is often near straight ahead (0, 0)."""
+    direction is often near straight ahead (0, 0).
+
+    Args:
+        dice: source of random numbers.
+        place: the current gaze direction in degrees, to the left and up.
+        scale: factor of the range of the gaze.
+    """
     if abs(place[0]) + abs(place[1]) > 4.0 * scale and dice.uniform() < 0.7:
         return (scale * dice.uniform(-1.2, 1.2), scale * dice.uniform(-0.8, 0.8))
     size = min(dice.lognormal(4.5, 0.7), 22.0) * scale
@@ -367,7 +387,8 @@ def _gaze_curves(times: Doubles, saccades: list[Saccade], life: Life) -> dict[st
 
 
 def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[str, Doubles]:
-    """Curves of subtle motion; three quarters of the motion is equal on the left and right."""
+    """Curves of subtle motion. The curve of each side is three quarters common motion and one
+    quarter motion of its own; the jaw has one curve."""
     out = {}
     for stream, (name, (amount, step)) in enumerate(MICRO.items()):
         common, left, right = (
@@ -387,7 +408,9 @@ def _raised(noise: Doubles) -> Doubles:
 
 
 def _noise(dice: _Dice, times: Doubles, step: float, loop: bool) -> Doubles:
-    """Slow noise in [-1, 1], two octaves of cubic B-splines; periodic only if `loop` is True."""
+    """Slow noise in [-1, 1]: four fifths of a random cubic B-spline with a point every `step`
+    seconds, plus one fifth of a spline with a point every 0.36 * `step` seconds. Periodic only if
+    `loop` is True."""
     return 0.8 * _spline(dice, times, step, loop) + 0.2 * _spline(dice, times, 0.36 * step, loop)
 
 

@@ -38,7 +38,8 @@ class ReactionPart:
 
 @dataclass(frozen=True)
 class Reaction:
-    """A movement that ends by itself; it rises and falls along x * x * (3 - 2 * x)."""
+    """A movement that ends by itself; it rises and falls along the curve x * x * (3 - 2 * x) for x
+    from 0 to 1."""
 
     name: str
     parts: tuple[ReactionPart, ...]
@@ -99,6 +100,7 @@ def load_reactions(path: str | os.PathLike[str] | None = None) -> dict[str, Reac
     """Reactions by name, from a file such as risorius/anim/reactions.toml, which is the default.
 
     Raises:
+        OSError: the file cannot be read.
         ValueError: invalid file; the message names the file, the value found and the one expected.
     """
     table, where = _read(path, "reactions.toml")
@@ -111,6 +113,7 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
     """Rules from a file such as risorius/anim/exclusives.toml, which is the default.
 
     Raises:
+        OSError: the file cannot be read.
         ValueError: invalid file; the message names the file, the value found and the one expected.
     """
     table, where = _read(path, "exclusives.toml")
@@ -130,7 +133,8 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
         pairs = tuple((prefix + a, prefix + b) for a, b in rows)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ArgumentError(
-            f"{where}: yields with by and of, and pairs of opposites were expected: {error!r}"
+            f"{where}: tables of yields with by and of, and pairs of opposites were expected: "
+            f"{error!r}"
         ) from None
     return Exclusives(yields, pairs)
 

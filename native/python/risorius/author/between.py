@@ -17,16 +17,20 @@ SHARES = (0.25, 0.5, 0.75)
 
 
 class Ways:
-    """Joint motions by single inputs at 1 and at SHARES, in the new face and in its source face.
+    """Joint motions by single inputs at 1 and at SHARES (0.25, 0.5, 0.75), in the new face and in
+    its source face.
 
     Attributes:
-        rest: float64[joints, 3], neutral positions of all joints.
-        whole: float64[C, joints, 3, 4], motions of the new face's joints with input C at 1, as
-            matrices from positions in the rest pose to posed positions.
-        made: share -> motions of the new face's joints with the input at this value.
-        before: share -> motions of the source's joints with the input at this value.
+        rest: float64[joints, 3], neutral positions of the new face's joints.
+        whole: float64[C, joints, 3, 4], motions of the new face's joints with each of C inputs at
+            1, as matrices from positions in the rest pose to posed positions.
+        made: control value of SHARES -> motions of the new face's joints, shaped as `whole`, with
+            each input at this value.
+        before: control value of SHARES -> float64[C, J, 3, 4], motions of the source's J joints
+            with each input at this value.
         turning: bool[C], whether an input moves joints of the source.
-        middles: row of an expression -> float64[3], the pivot of its motion.
+        middles: index of an input in the C inputs -> float64[3], the pivot about which the input
+            turns vertices; inputs without a pivot have no entry.
     """
 
     def __init__(self, work: Work) -> None:
@@ -47,7 +51,8 @@ class Ways:
 
 
 class Between:
-    """Measures a mesh's errors with an input at SHARES: its distance from the wanted positions.
+    """Measures the errors of a mesh with an input at SHARES (0.25, 0.5, 0.75): the distances of its
+    vertices from their wanted positions.
 
     The wanted positions are on straight lines, on arcs about a pivot, or on the arcs of the
     source's joints.
@@ -62,7 +67,7 @@ class Between:
         """The wanted displacements float64[V, 3] at each control value in `shares`.
 
         Args:
-            row: row of the expression.
+            row: index of the expression among the C inputs.
             wanted: float64[V, 3], its displacements at 1.
             shares: values of the control, some of SHARES.
         """
@@ -87,7 +92,7 @@ class Between:
         """The largest error of the joints at SHARES, in the file's unit.
 
         Args:
-            row: row of the expression.
+            row: index of the expression among the C inputs.
             wanted: float64[V, 3], its displacements at 1.
             skin: the mesh with its weights on the joints of the new face.
         """

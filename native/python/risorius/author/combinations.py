@@ -25,8 +25,8 @@ from .geometry.skeleton import Doubles, Ints
 from .work import MM, RigOptions, Work, listed_meshes
 
 _STEPS = 3  # number of Gauss-Newton steps
-_OFF_MM = 0.05  # vertices with a larger error are corrected; other vertices only hold the solution
-_MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of these vertices, taken evenly
+_OFF_MM = 0.05  # vertices with a larger error are corrected; some other vertices must not move
+_MOST_OFF, _MOST_HELD = 1500, 500  # largest numbers of both kinds of vertices in a mesh
 # Largest number of joints in a Gauss-Newton step. A joint is left out if the weighted squared error
 # of its vertices is below _LEAST_SHARE of the largest such error of a joint.
 _MOST_JOINTS, _LEAST_SHARE = 128, 2e-4
@@ -39,12 +39,13 @@ T = TypeVar("T")
 
 @dataclass
 class Combination:
-    """The errors in a corrective's pose on the finest meshes, mm."""
+    """Errors of the face of joints on the meshes of LOD 0, in mm, with all controls of a corrective
+    at 1."""
 
     name: str
-    before: float  # largest error of the joints without the corrective
-    joints_largest: float  # largest error of the joints with the corrective
-    largest: float  # largest error with blend shapes
+    before: float  # largest error without the corrective
+    joints_largest: float  # largest error with the corrective's joint values, without its shapes
+    largest: float  # largest error with the corrective's joint values and blend shapes
     column: int = -1  # index of its input
 
 
@@ -99,7 +100,12 @@ class _Skin:
         )
 
     def made(self, shaped: Doubles, motions: Doubles) -> Doubles:
-        """float64[V, 3]: the skinned vertices of the face of joints."""
+        """float64[V, 3]: the skinned vertices of the face of joints.
+
+        Args:
+            shaped: float64[V, 3], vertices before skinning, with the blend shapes.
+            motions: float64[joints, 3, 4], motions of the joints of the face of joints.
+        """
         return self._made.bring(shaped, motions)
 
     def rows(self, at: Ints) -> Doubles:
@@ -109,7 +115,7 @@ class _Skin:
         return out
 
     def touched(self, joints: Ints) -> Ints:
-        """Indices of the vertices on which one of these joints has a weight."""
+        """Indices of the vertices on which at least one of `joints` has a weight."""
         there = np.zeros(self._count, bool)
         there[joints] = True
         held = there[self._made.joints] & (self._made.weights > 0)
@@ -212,7 +218,15 @@ class Combinations:
         self._leave(column, active, rows, joints)
 
     def _leave(self, column: int, active: list[int], rows: _Rows, joints: Ints) -> None:
-        """Set to 0 the values of joints that move no vertex by least_effect_mm or more."""
+        """Set a corrective's values of a joint to 0 if they move each vertex of `rows` by less than
+        options.least_effect_mm.
+
+        Args:
+            column: the corrective's input.
+            active: inputs at 1 in the pose of the corrective; the corrective is the last.
+            rows: the vertices of the corrective's equations.
+            joints: indices of the new joints whose values were solved.
+        """
         whole = self.after.motions(self.after.worlds(active))
         plain = self.after.motions(self.after.worlds(active[:-1]))
         for joint in joints.tolist():
@@ -226,7 +240,12 @@ class Combinations:
     def _rows(self, skins: list[_Skin], active: list[int]) -> tuple[_Rows, Ints]:
         """Choose the vertices and the new joints of a corrective's equations.
 
-        Returns: vertices with an error, and some others, which must not move; the joints' indices.
+        Args:
+            skins: the meshes.
+            active: inputs at 1 in the pose of the corrective; the corrective is the last.
+
+        Returns: vertices with an error, and some other vertices, which must not move; the indices
+            of the new joints.
         """
         motions = self.after.motions(self.after.worlds(active))
         parts, found, errors = [], [], []
@@ -319,7 +338,12 @@ class Combinations:
     def _targets(
         self, left: Sequence[BlendShapeTarget | None], channel: dict[int, int]
     ) -> list[BlendShapeTarget]:
-        """The blend shapes of the correctives that have a channel."""
+        """The blend shapes of the correctives that have a channel.
+
+        Args:
+            left: for each corrective, its blend shape, or None.
+            channel: input -> blend shape channel.
+        """
         out = []
         for target, column in zip(left, self.order, strict=True):
             if target is not None and column in channel:
@@ -390,8 +414,8 @@ def _equations(
     arms = arms.copy()
     arms[..., 3] += arms[..., :3] @ middle
     places = np.concatenate([shaped - middle, np.ones((len(shaped), 1))], axis=1)
-    # Displacement of a vertex by a unit shift or rotation of a joint. It is linear in the vertex'
-    # position: three rows for x, y and z, and a constant.
+    # Displacement of a vertex by a unit shift or rotation of a joint. The displacement is linear in
+    # the vertex' position: three rows for x, y and z, and a constant.
     moves = np.zeros((4, count, 6, 3))
     moves[3, :, :3] = turns.transpose(0, 2, 1)
     crossed = np.cross(_AXES, arms.transpose(2, 0, 1)[:, :, None])  # [4, J, axis, 3]

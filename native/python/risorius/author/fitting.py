@@ -27,7 +27,7 @@ class FitOptions:
 
     joints: int = 120  # number of new joints
     influences: int = 8  # largest number of joints per vertex
-    smoothness: float = 1.0  # smoothness of weights; 0: only the error counts; 1: as Dem Bones
+    smoothness: float = 1.0  # 0: only the error counts; 1: as smooth as the default of Dem Bones
     emphasis: float = 3.0  # weight of large errors; 0: least squares only
     rounds: int = 40  # number of iterations
     symmetric: bool = True  # symmetric joints if the mesh is symmetric

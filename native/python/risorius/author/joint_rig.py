@@ -53,7 +53,7 @@ from .work import (
 
 # Finished fraction at the ends of the preparation, of the fit and of the meshes.
 _BEGUN, _FIT, _MESHES = 0.1, 0.7, 0.8
-_SOLVED = 0.6  # of the progress of correctives, at the end of their solution
+_SOLVED = 0.6  # finished fraction of the work on correctives once joint values are solved
 _EMPTY = 2.0  # groups by region may have this factor more coefficients than groups by drivers
 
 
@@ -96,8 +96,10 @@ def make_joint_rig(
 
     Raises:
         DnaError: a value is not finite, nothing moves, or progress returned False.
-        ValueError: the face has no mesh, a joint changes its size, every joint moves, or the face
-            has another topology than `like`.
+        ValueError: the face has no mesh, a joint changes its size, every joint moves, no expression
+            moves a blend shape of LOD 0, the LOD options are invalid, or the face has another
+            topology than `like`.
+        BudgetError: the tables would be too large for the size of the face.
     """
     work, fit, made, regions = _made(dna, options or RigOptions(), progress, like)
     made.finish()
@@ -142,7 +144,7 @@ def lighten(rig: JointRig, source: Dna) -> None:
 
 def _take_errors(rig: JointRig, found: Lightened) -> None:
     """Raise stored largest errors of a rig to the lengths of its removed deltas if these are
-    longer."""
+    longer, and store the new number of deltas of each LOD."""
     dna, channels = rig.dna, channels_of(rig.dna)
     for errors in rig.errors:
         for row, column in enumerate(rig.columns):
@@ -263,14 +265,15 @@ def _made(
 
 
 def _take_chosen(work: Work, other: Work) -> None:
-    """Copy to `work` the parents, heirs and joints of each LOD that were chosen in `other`, the
-    face with simplified meshes."""
+    """Copy to `work` the parents, pivots, mirrored joints, heirs and the joints of each LOD, which
+    were chosen in `other`, the face with simplified meshes."""
     work.parents, work.new, work.pivots = other.parents, other.new, other.pivots
     work.mirrored, work.heirs = other.mirrored, other.heirs
 
 
 def _counting(progress: Progress | None, least: int) -> Callable[[], None]:
-    """As _asking(), but the reported fraction grows with each call and approaches _BEGUN.
+    """A function that passes a finished fraction to `progress`, and raises DnaError if `progress`
+    returns False. The fraction grows with each call and approaches _BEGUN.
 
     Args:
         progress: gets the finished fraction.
@@ -303,8 +306,8 @@ def _new_joints(
     options: RigOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """Fit joints and dense weights of the meshes of LOD 0. Sets parents, new, mirrored and heirs in
-    `work`."""
+    """Fit joints and dense weights of the meshes of LOD 0. Sets pivots, parents, new, mirrored and
+    heirs in `work`."""
     room = room_for_second(work, shaped, wanted, options.fit.joints)
     own = replace(options.fit, joints=options.fit.joints - room)
     jaw = _jaw(work)
@@ -318,7 +321,14 @@ def _new_joints(
 def _combine(
     work: Work, made: Made, regions: dict[str, list[str]], progress: Progress | None
 ) -> list[Combination]:
-    """Add joint values and blend shapes for the correctives. Returns the correctives' errors."""
+    """Add joint values and blend shapes for the correctives. Returns the correctives' errors.
+
+    Args:
+        work: the face.
+        made: the meshes of all LODs.
+        regions: region -> names of its joints.
+        progress: gets the finished fraction of this step.
+    """
     if not work.combined:
         return []
     found = Combinations(work, made.options, made.fewer)
@@ -336,10 +346,11 @@ def _combine(
 
 
 def grouped(dna: Dna, regions: dict[str, list[str]]) -> Dna:
-    """The face with joint groups by region, or with joint groups by the controls that drive the
-    joints if these groups have far fewer coefficients.
+    """The face with joint groups by region. If joint groups by the controls that drive the joints
+    have less than half as many coefficients, the face gets these groups.
 
-    They have fewer if many correctives each move a few joints of a region.
+    Groups by controls have fewer coefficients if many correctives each move a few joints of a
+    region.
 
     Args:
         dna: a face; it is not changed.
@@ -359,7 +370,8 @@ def _level_count(dna: Dna, options: LodOptions) -> int:
 
 
 def _jaw(work: Work) -> int | None:
-    """The joint that jawOpen moves most, or None."""
+    """The index of the source's joint that jawOpen moves most; None if the face has no jawOpen or
+    jawOpen moves no joint."""
     opening = [e for e, name in enumerate(work.names) if name.endswith("jawOpen")]
     if not opening:
         return None
@@ -374,7 +386,15 @@ def _part(progress: Progress | None, begin: float, end: float) -> Progress | Non
 def _order_levels(
     work: Work, shaped: Sequence[int], fit: Joints, weights: dict[int, Doubles], o: RigOptions
 ) -> None:
-    """Choose the new joints of each LOD. Sets new, mirrored and heirs in `work`."""
+    """Choose the new joints of each LOD. Sets new, mirrored and heirs in `work`.
+
+    Args:
+        work: the face.
+        shaped: indices of the fitted meshes.
+        fit: the joints.
+        weights: mesh -> float64[V, joints].
+        o: options of the rig, with the number of joints of each LOD.
+    """
     used = given(work)
     count = len(fit.joints) - len(used)
     budgets = joint_budgets(o.lods, work.levels, count)
@@ -400,8 +420,8 @@ def _order_levels(
 
 
 def _mirrored_given(work: Work) -> dict[int, int]:
-    """Joint of the source -> the joint at its mirrored place (x negated), or itself if there is
-    none."""
+    """Joint of the source -> the joint at its mirrored place (x negated); a joint in the middle or
+    without such a joint names itself."""
     near = 1e-3 * np.ptp(work.positions, axis=0).max()
     out = {}
     for joint, place in enumerate(work.positions):
@@ -419,7 +439,16 @@ def _fit(
     options: FitOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """Fit all meshes of the finest LOD together. Returns the joints and dense weights by mesh."""
+    """Fit all meshes of the finest LOD together. Returns the joints and dense weights by mesh.
+
+    Args:
+        work: the face.
+        meshes: indices of the meshes.
+        wanted: mesh -> its displacements.
+        jaw: index of the joint that opens the mouth, or None.
+        options: options of the fit.
+        progress: gets the finished fraction of the fit.
+    """
     dna = work.source
     neutral = joined_positions(work, meshes)
     moved = joined_displacements(wanted, meshes).astype(np.float32)
@@ -467,7 +496,14 @@ def _pivots(
 
 
 def _names(work: Work, fit: Joints, effects: Doubles, places: Doubles) -> list[str]:
-    """Names of the new joints, from their places and the expressions that move them."""
+    """Names of the new joints, from their places and the expressions that move them.
+
+    Args:
+        work: the face.
+        fit: the joints.
+        effects: float64[C, new joints], largest displacement by each joint in each expression, mm.
+        places: float64[new joints, 3], middle of the vertices of each joint.
+    """
     dna = work.dna
     first = len(given(work))
     left = -1 if dna.coordinate_system[0] == "left" else 1
@@ -511,8 +547,15 @@ def _beside_parents(work: Work, fit: Joints) -> Doubles:
 
 
 def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Doubles:
-    """float64[new joints, 3]: weighted mean of the positions of each joint's vertices, or the
-    position of a joint without vertices."""
+    """float64[new joints, 3]: mean of the positions of each joint's vertices, weighted by squared
+    skin weights, or the position of a joint without vertices.
+
+    Args:
+        work: the face.
+        meshes: indices of the fitted meshes.
+        fit: the joints.
+        held: float64[V, new joints], weights of the new joints on the vertices of these meshes.
+    """
     rows = held**2
     total = rows.sum(axis=0)[:, None]
     middles = (rows.T @ joined_positions(work, meshes)) / np.maximum(total, 1e-30)
@@ -521,7 +564,14 @@ def _places(work: Work, meshes: Sequence[int], fit: Joints, held: Doubles) -> Do
 
 def _effects(work: Work, meshes: Sequence[int], motions: Doubles, held: Doubles) -> Doubles:
     """float64[C, new joints]: largest displacement of a vertex by each joint alone, in mm, in each
-    of C expressions."""
+    of C expressions.
+
+    Args:
+        work: the face.
+        meshes: indices of the fitted meshes.
+        motions: float64[C, new joints, 3, 4], motions relative to the parents.
+        held: float64[V, new joints], weights of the new joints on the vertices of these meshes.
+    """
     positions = joined_positions(work, meshes)
     moves = motions - np.eye(3, 4)
     out = np.zeros(motions.shape[:2])
@@ -541,7 +591,16 @@ def _add_behavior(
     regions: dict[str, list[str]],
     options: RigOptions,
 ) -> None:
-    """Add a joint group of the new joints, and divide it into dense groups by region."""
+    """Add a joint group of the new joints, and divide it into dense groups by region.
+
+    Args:
+        work: the face.
+        motions: float64[C, new joints, 3, 4], motions relative to the parents.
+        effects: float64[C, new joints], largest displacement of a vertex in mm; a joint does not
+            move in an expression in which this is below options.least_effect_mm.
+        regions: region -> names of its joints.
+        options: options of the rig.
+    """
     dna = work.dna
     before = len(work.source.joint_names)
     # Express the motions, which are relative to the parents, in the parents' neutral frames.

@@ -19,7 +19,7 @@ from .levels import LodOptions, mesh_budget, vertex_budgets
 from .work import Work, listed_meshes
 
 _POSES = 6  # number of expressions with the largest motion that are checked beside the rest pose
-_LOOKED_AT = 2000  # number of checked vertices of the fine skin
+_LOOKED_AT = 2000  # smallest number of checked vertices of the fine skin, if it has them
 # Limits of a LOD: root mean square and largest distance of its skin from the finest skin, as
 # fractions of the longest side of the skin's bounding box.
 _RMS, _FARTHEST = 0.005, 0.015
@@ -53,9 +53,10 @@ def level_meshes(
 ) -> LevelMeshes:
     """Simplify the meshes of LOD 0 for each coarser LOD.
 
-    If the options give no vertex budgets, the LODs end before the skin of a LOD looks broken: it
-    has too many slivers, edges folded by more than 120 degrees, or a large distance from the skin
-    of LOD 0. The neutral pose and the expressions that move the skin most are checked.
+    If the options give no vertex budgets, the LODs end before the skin of a LOD looks broken: it is
+    left out, has too many slivers, too many edges folded by more than 120 degrees, or a large
+    distance from the skin of LOD 0. The neutral pose and the expressions that move the skin most
+    are checked.
 
     Args:
         work: the face.
@@ -121,7 +122,8 @@ class _Skin:
         self.had = shapes_of(self.poses, self.fine)
 
     def wrong(self, triangles: Ints | None) -> str:
-        """The fault of the skin of a LOD as text; "" if there is none.
+        """The fault of the skin of a LOD as text; "" if there is none or if the skin has more than
+        LARGE (60,000) vertices, because such a skin is not checked.
 
         Args:
             triangles: int64[n, 3], layout indices; None if the LOD has no skin.

@@ -40,8 +40,9 @@ def level_weights(
     """float64[V, joints]: skin weights on the joints of a LOD.
 
     The fit gets two kinds of additional expressions. The first kind shifts a joint that no
-    expression moves, such as the neck, with all its children, so that vertices keep following it.
-    The second kind is the pose at the value 0.5 of expressions that move vertices along arcs.
+    expression moves, such as the neck, with all its children, so that vertices keep following this
+    joint. The second kind is the pose at the value 0.5 of expressions that move vertices along
+    arcs. At LOD 0 without additional expressions, `start` is returned and nothing is fitted.
 
     Args:
         ways: motions of the face; the parents of new joints must be known.
@@ -49,7 +50,7 @@ def level_weights(
         lod: index of the LOD. Coarser LODs use less smoothness, because their vertices are farther
             apart.
         mesh: the mesh with its weights in the source.
-        wanted: its displacements float64[E, V, 3].
+        wanted: float64[E, V, 3], displacements of the mesh with each expression at 1.
         start: float64[V, joints], weights to start with.
     """
     work = ways.work
@@ -78,7 +79,7 @@ def level_weights(
 def _carried(work: Work, mesh: Mesh) -> tuple[Doubles, Doubles, Ints]:
     """Additional expressions that shift joints that no real expression moves, such as the neck.
 
-    Because of them, vertices keep following these joints.
+    Because of the additional expressions, vertices keep following these joints.
 
     Returns: motions [n, joints, 3, 4], displacements [n, V, 3], and the indices of the joints of
         the source that the fit uses.

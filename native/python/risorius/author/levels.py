@@ -19,10 +19,10 @@ from ..base.errors import ArgumentError
 from .geometry.blocks import LARGE
 from .geometry.skeleton import Doubles, Ints
 
-# Fraction of LOD 0's joints that each LOD keeps, about as in hand-made faces. It falls more slowly
-# than the number of vertices does.
+# Fraction of LOD 0's joints that each LOD keeps, about as in hand-made faces. The fraction falls
+# more slowly than the number of vertices does.
 _JOINTS = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12, 0.06)
-_FALL = 0.6  # number of vertices relative to the level before
+_FALL = 0.6  # number of vertices relative to the next finer LOD
 _LEAST_JOINTS = 4
 # Substrings of the names of small meshes that coarse LODs leave out: clear films, lashes, tongue.
 _SMALL = ("lash", "saliva", "shell", "cornea", "eyeedge", "cartilage", "tongue")
@@ -42,8 +42,8 @@ class LodOptions:
     vertices: tuple[int, ...] = ()
 
     def check(self) -> None:
-        """Raise ValueError if `count` is invalid, or if `joints` or `vertices` has not `count`
-        numbers or its numbers increase."""
+        """Raise ValueError if `count` is not 1 to 32, or if `joints` or `vertices` is given and has
+        another number of entries than `count`, increases, or has a negative entry."""
         if not 1 <= self.count <= 32:
             raise ArgumentError(f"lods.count: 1 to 32 was expected, found {self.count}")
         for name, budgets in (("joints", self.joints), ("vertices", self.vertices)):
@@ -195,7 +195,8 @@ def level_joints(order: Sequence[int], mirrored: Ints, budget: int) -> Ints:
 
 
 def vertex_budgets(options: LodOptions, levels: int, existing: Sequence[int]) -> list[int]:
-    """The number of vertices of each LOD; at most LARGE for a new LOD without a given budget.
+    """The number of vertices of each LOD; at most LARGE (60,000) for a new LOD without a given
+    budget.
 
     Args:
         options: budgets, if given.

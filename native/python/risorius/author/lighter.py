@@ -101,8 +101,8 @@ def _limit(meshes: Sequence[Mesh], budget: int) -> float | None:
 
 
 def _without(mesh: Mesh, limit: float) -> tuple[Mesh, dict[int, float]]:
-    """The mesh without deltas of at most a length, and channel -> length of its longest removed
-    delta."""
+    """The mesh without deltas that are not longer than `limit`, and channel -> length of its
+    longest removed delta; lengths are in the file's unit."""
     out, targets, dropped = copy.copy(mesh), [], {}
     for target, lengths in zip(mesh.blend_shape_targets, _lengths(mesh), strict=True):
         kept = lengths > limit

@@ -141,7 +141,7 @@ class Made:
             lod: index of the LOD.
             mesh: the mesh with its weights in the source.
             name: name of the mesh.
-            wanted: its displacements.
+            wanted: displacements of the mesh.
             start: float64[V, joints], weights to start with; None keeps the mesh unchanged.
         """
         self._listed(lod, name)
@@ -228,7 +228,15 @@ class Made:
             self.errors.append(left)
 
     def _finished(self, lod: int, mesh: Mesh, name: str, wanted: Wanted, rows: Rows) -> None:
-        """Add a mesh with its weights, with blend shapes for the joints' errors, and the errors."""
+        """Add a mesh with its weights, with blend shapes for the joints' errors, and the errors.
+
+        Args:
+            lod: index of the LOD.
+            mesh: the mesh with its weights in the source.
+            name: name of the mesh.
+            wanted: displacements of the mesh.
+            rows: new weights of the vertices on all joints.
+        """
         made = copy.copy(mesh)
         _set_skin(made, rows)
         self.meshes.append(made)
@@ -288,7 +296,15 @@ def _finish_mesh(
     wanted: Doubles,
     options: RigOptions,
 ) -> tuple[Mesh, MeshErrors]:
-    """The mesh with new weights and with blend shapes for the joints' errors; and the errors."""
+    """The mesh with new weights and with blend shapes for the joints' errors; and the errors.
+
+    Args:
+        ways: joint motions of the face.
+        mesh: the mesh with its weights in the source.
+        rows: float64[V, joints], new weights.
+        wanted: float64[E, V, 3], displacements with each expression at 1.
+        options: options of the rig.
+    """
     work = ways.work
     out = copy.copy(mesh)
     weights = _kept_weights(rows)
@@ -342,7 +358,13 @@ def _no_errors(vertices: int, expressions: list[str]) -> MeshErrors:
 
 
 def _take_errors(whole: MeshErrors, part: MeshErrors, vertices: Ints) -> None:
-    """Merge the errors of a block of vertices into the errors of the mesh."""
+    """Merge the errors of a block of vertices into the errors of the mesh.
+
+    Args:
+        whole: errors of the mesh; changed.
+        part: errors of the block.
+        vertices: index in the mesh of each vertex of the block.
+    """
     worse = part.joints_largest > whole.joints_largest
     whole.worst_vertex[worse] = vertices[part.worst_vertex[worse]]
     share = part.vertices / whole.vertices
@@ -353,7 +375,7 @@ def _take_errors(whole: MeshErrors, part: MeshErrors, vertices: Ints) -> None:
 
 
 def _kept_weights(rows: Doubles) -> Doubles:
-    """float64[V, joints]: weights without very small ones; the rows have the sum 1."""
+    """float64[V, joints]: the weights above 0.001, scaled so that each row has the sum 1."""
     kept = np.where(rows > _LEAST_WEIGHT, rows, 0)
     kept[~kept.any(axis=1), 0] = 1  # vertices without weights follow the root
     kept /= kept.sum(axis=1, keepdims=True)

@@ -44,7 +44,8 @@ def joint_motions(fit: Joints) -> Doubles:
 def choose_parents(
     work: Work, meshes: Sequence[int], fit: Joints, weights: dict[int, Doubles], jaw: int | None
 ) -> list[int]:
-    """The parent of each new joint; mirrored joints get the same parent.
+    """The index of the parent of each new joint. If all joints that no expression moves are in the
+    middle of the face, mirrored joints get the same parent.
 
     Args:
         work: the face.
@@ -74,7 +75,8 @@ def room_for_second(
 ) -> int:
     """The number of new joints reserved for second_joints().
 
-    It is 0 if all moved vertices follow the head only.
+    The number is 0 if each moved vertex has at most 15 % of its weight on a joint that no
+    expression moves, other than the head.
 
     Args:
         work: the face.
@@ -137,7 +139,16 @@ def _split(
     split: list[tuple[int, int]],
 ) -> tuple[Joints, dict[int, Doubles], list[int]]:
     """Add second joints, and divide the weights of each first joint between it and its
-    second joints."""
+    second joints.
+
+    Args:
+        work: the face.
+        fit: the joints.
+        weights: mesh -> float64[V, joints].
+        shares: mesh -> float64[V, resting joints], result of carried_shares().
+        split: for each second joint, the index of its first joint among the new joints, and the
+            index of its parent among the joints that no expression moves.
+    """
     first, before = len(given(work)), len(work.source.joint_names)
     count = len(fit.joints)
     still, own = resting(work), carriers(work)
@@ -172,7 +183,17 @@ def _split(
 def _follow(
     work: Work, meshes: Sequence[int], fit: Joints, rows: Doubles, mirrored: Ints, jaw: int
 ) -> npt.NDArray[np.bool_]:
-    """bool[new joints]: whether a joint's motion is closer to the jaw's motion than to none."""
+    """bool[new joints]: whether, in the expressions that move the jaw, the motion of a joint and of
+    its mirrored joint is closer to the jaw's motion than to no motion.
+
+    Args:
+        work: the face.
+        meshes: indices of the fitted meshes.
+        fit: the joints.
+        rows: float64[V, new joints], weights of the new joints.
+        mirrored: int64[new joints], the mirrored new joint.
+        jaw: index of the joint that opens the mouth.
+    """
     first = len(given(work))
     moving = np.flatnonzero(np.abs(work.motions[:, jaw] - np.eye(3, 4)).max(axis=(1, 2)) > 1e-9)
     own = joint_motions(fit)[moving, first:]

@@ -77,8 +77,8 @@ def _side(joint: str) -> str:
 
 
 def _sphere(positions: Doubles, displacement: Doubles) -> Doubles | None:
-    """The centre of the sphere on which the open and the shut lid lie; None if there is no such
-    sphere."""
+    """The centre of the sphere on which the open and the shut lid lie; None if fewer than 6
+    vertices move far enough, or if no sphere fits them."""
     length = np.linalg.norm(displacement, axis=1)
     edge = length > 0.5 * length.max()
     if np.count_nonzero(edge) < 6:
@@ -96,8 +96,8 @@ def _sphere(positions: Doubles, displacement: Doubles) -> Doubles | None:
 
 
 def _hinge(positions: Doubles, displacement: Doubles) -> Doubles | None:
-    """The point on the jaw's rotation axis that is nearest to the jaw; None if the jaw only
-    shifts."""
+    """The point on the jaw's rotation axis that is nearest to the jaw; None if the jaw turns by
+    less than _LEAST_TURN (0.05 radians)."""
     length = np.linalg.norm(displacement, axis=1)
     held = length > 0.7 * length.max()
     before, after = positions[held], positions[held] + displacement[held]

@@ -162,7 +162,7 @@ class _Meshes(Protocol):
 
 def reference_of(work: Work, fit: Joints, made: _Meshes) -> Reference:
     """The reference of a finished joint rig; it has no weights if the rig has a mesh of more than
-    LARGE vertices.
+    LARGE (60,000) vertices.
 
     Args:
         work: the face; the joints of its LODs are already chosen.

@@ -112,8 +112,9 @@ class Work:
     names: list[str]  # names of these inputs
     motions: Doubles  # [C, J, 3, 4] motions of the source's joints
     positions: Doubles  # [J, 3] neutral positions of the source's joints
-    head: int  # the joint that no expression moves with the largest weights on moved vertices
-    wanted: dict[int, Wanted] = field(default_factory=dict)  # by mesh, released early
+    head: int  # the joint that carries most of the motion, of the joints that no expression moves
+    # mesh -> its displacements; emptied before the fit, to free memory
+    wanted: dict[int, Wanted] = field(default_factory=dict)
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # indices of each level's new joints
     pivots: list[Pivot] = field(default_factory=list)
@@ -127,15 +128,16 @@ class Work:
 
 
 def begin(dna: Dna, go_on: Callable[[], None] = lambda: None) -> Work:
-    """The face, and the displacements of its meshes.
+    """The Work of a face: the names and motions of its inputs, the displacements of its meshes, and
+    its head joint.
 
     Args:
         dna: a face with blend shapes; it is not changed.
         go_on: called before each mesh and each block of a large mesh; raises an error to stop.
 
     Raises:
-        ArgumentError: the face has no meshes or joints, no control moves it, a control scales a
-            joint, or require_sizes() rejects the meshes.
+        ArgumentError: the face has no meshes or joints, no control moves it, controls move every
+            joint, a control scales a joint, or require_sizes() rejects the meshes.
         BudgetError: the tables would be too large for the size of the face.
     """
     if not dna.meshes or not dna.joint_names:
@@ -172,8 +174,9 @@ def require_sizes(dna: Dna) -> None:
         dna: the face.
 
     Raises:
-        ArgumentError: the face has no mesh, all vertices are in one point, or a coordinate is
-            infinite, NaN, or so large (above FARTHEST) that its square could overflow.
+        ArgumentError: the face has no mesh, no mesh has vertices at different places, or a
+            coordinate is infinite, NaN, or so large (above FARTHEST) that its square could
+            overflow.
     """
     if not dna.meshes:
         raise ArgumentError("a face with meshes was expected")
@@ -237,8 +240,8 @@ def _head(work: Work) -> int:
 
 
 def needs_joints(work: Work, wanted: Wanted) -> bool:
-    """Whether blend shapes contribute to a mesh's motion; False for an eyeball, which existing
-    joints alone move.
+    """Whether blend shapes change the motion of a mesh by more than 0.02 mm; False for an eyeball,
+    which existing joints alone move.
 
     Args:
         work: the face.
@@ -261,7 +264,7 @@ def resting(work: Work) -> Ints:
 
 def carriers(work: Work) -> Ints:
     """int64[joints]: for each joint, its own index if no expression moves it, otherwise the index
-    of its nearest ancestor that no expression moves.
+    of its nearest ancestor that no expression moves, or of the head if there is no such ancestor.
 
     Args:
         work: the face. New joints are included if their parents are chosen.
@@ -282,7 +285,8 @@ def carriers(work: Work) -> Ints:
 def carried_shares(work: Work, mesh: Mesh) -> Doubles:
     """float64[V, n]: the fraction of a vertex' weights that each of the n joints of resting() has.
 
-    It is the sum of the weights on the joints whose carriers() is this joint. Rows have the sum 1.
+    The fraction is the sum of the weights on the joints whose carriers() is this joint. Rows have
+    the sum 1, or 0 for a vertex without weights.
 
     Args:
         work: the face.

@@ -23,10 +23,9 @@ class Performance:
 
     Attributes:
         clip: curves of raw controls; the character may lack some of these controls.
-        mapping: name of the mapping that was used; "" if the file's curves are named like raw
-            controls, so that no mapping is needed.
+        mapping: name of the mapping that was used; "" for none.
         unmapped: names of the file's curves that are no raw controls and that the mapping does not
-            know.
+            know; empty for a .rzc file without a mapping, whose curves all stay.
     """
 
     clip: risorius.Clip
@@ -42,7 +41,8 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
         face: the character; curves of its raw controls are used directly, and curves of its GUI
             controls are converted to raw controls.
         mapping: name of a built-in mapping, or path of a TOML file; None: the mapping that fits
-            best; a .rzc file is then not mapped.
+            best. With None, a .rzc file is not mapped, and neither is a file with curves of raw
+            controls whose format has no mapping of its own.
 
     Raises:
         OSError, ValueError: the file is no animation, or no mapping fits it; the error names the

@@ -65,7 +65,8 @@ class Face:
     def rest(self, part: str) -> Floats:
         """The rest values of a part of the pose, one of PARTS.
 
-        The part "joints" has float32[joints, columns]; other parts have float32[n], one per name.
+        The part "joints" has float32[joints, columns], the difference from the neutral joint: 0,
+        but 1 for qw. Other parts have float32[n], one per name.
         """
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
@@ -77,7 +78,7 @@ class Face:
         return rest
 
     def check_lod(self, lod: int) -> None:
-        """Raises: ValueError: the character lacks this LOD."""
+        """Check that the character has a LOD. Raises: ValueError: it lacks the LOD."""
         last = max(1, self.rig.lod_count) - 1
         if not 0 <= lod <= last:
             raise ArgumentError(f"{self.name}: a LOD from 0 to {last} was expected, found {lod}")
@@ -114,8 +115,8 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
     """A unique name for each element of a kind.
 
-    An element without a name is called by its kind and index, e.g. "joint 3". Its index is added to
-    a name that an earlier element has, e.g. "jaw#3".
+    An element without a name is called by its kind and index, e.g. "joint 3". If an earlier element
+    has the same name, the index is added to the later element's name, e.g. "jaw#3".
     """
     out: list[str] = []
     seen: set[str] = set()
@@ -144,6 +145,7 @@ def prepared(
 
     Raises:
         ValueError: no frame remains.
+        BudgetError: `rate` gives more frames than a clip of this size may have.
     """
     found = clip.frame_count
     if rate is not None:
@@ -164,7 +166,8 @@ def prepared(
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
     """Add curves of the raw controls that rotate the neck and head joints of a face.
 
-    The rotations are computed from the clip's curves of ANGLES. Neck joints get no curves
+    The rotations are computed from the clip's curves of ANGLES: yaw, pitch and roll of neck and
+    head in radians. Neck joints get no curves
     if the clip has no neck angles, and head joints get none if it has no head angles. A joint also
     gets no curves if the clip already has a curve of one of its raw controls.
 
@@ -199,7 +202,8 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of curves of `clip` that have no effect, because `face` has no such raw control."""
+    """The names of curves of `clip` that have no effect on `face`: they are neither raw controls of
+    it nor angles of a bone that it rotates by raw controls."""
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))

@@ -78,10 +78,18 @@ def _amount(count: float) -> str:
 
 
 def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
-    """What remains of `left` after `count` is taken. Raises: BudgetError: `left` is too small."""
+    """`left` minus `count`. Raises BudgetError if `left` is smaller than `count`.
+
+    Args:
+        left: the rest of the budget.
+        most: the whole budget.
+        count: amount to take.
+        wanted: begin of the error text, with the place and the amount.
+        done: verb for the used part in the error text.
+    """
     if not count <= left:  # True for NaN too
         raise BudgetError(
             f"{wanted} more than the {most - left:,} {done} before would be needed, "
-            f"at most {most:,} in total were expected for this size"
+            f"at most {most:,} in total were expected for input of this size"
         )
     return left - int(count)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Lists the exceptions that NumPy raises for a damaged .npz, and limits the size of its arrays.
 
-NumPy does not document them: it passes on the errors of zip, zlib, struct and, from Python 3.12
-on, the tokenizer. An offset beyond the end of the file raises OSError, as a missing file does.
-Therefore open the file first, so that an OSError of NumPy means a damaged file.
+NumPy does not document these exceptions: it passes on the errors of zip, zlib, struct and, from
+Python 3.12 on, the tokenizer. An offset beyond the end of the file raises OSError, as a missing
+file does. Therefore open the file first, so that an OSError of NumPy means a damaged file.
 """
 
 from __future__ import annotations

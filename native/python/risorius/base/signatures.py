@@ -38,8 +38,8 @@ _WORD = Kind("word", "a document (Word)", "save it as plain text")
 _OFFICE = Kind("office", "a document of an office program", "save it as CSV or as plain text")
 _ZIP = Kind("zip", "an archive (ZIP)", "unpack it first")
 _UNREAL = Kind("unreal", "an asset of Unreal", "export it there, as FBX, JSON or DNA")
-# Bytes that identify a file, their offset in it, and its kind. No text file in UTF-8 or UTF-16 has
-# such bytes there.
+# Bytes that identify a file, their offset in the file, and the kind of the file. Text files that
+# people write hardly ever have such bytes there.
 _BYTES = (
     (b"WAVE", 8, SOUND),
     (b"AIFF", 8, SOUND),
@@ -134,7 +134,8 @@ def other_kind(data: bytes, own: Container[str] = ()) -> Kind | None:
 
 
 def ends_of(source: str | os.PathLike[str] | bytes) -> bytes:
-    """The start and the end of a file, enough for `kind_of`; empty if the path is no regular file.
+    """The start and the end of a file, enough for `kind_of`; empty if the path is no regular file
+    or cannot be read.
 
     Pipes are not opened: they can be read only once, and opening one might wait for ever.
     """

@@ -57,7 +57,8 @@ class Cluster:
     def workers(self) -> dict[str, int]:
         """Address of each worker -> number of jobs that it runs at the same time.
 
-        Raises: PoolError.
+        Raises:
+            PoolError: the scheduler does not answer.
         """
         try:
             return dict(self._client.nthreads())
@@ -71,7 +72,7 @@ class Cluster:
         """Outcomes as they arrive. Closing the iterator early cancels jobs that have not begun.
 
         Raises:
-            PoolError: the scheduler does not answer.
+            PoolError: the scheduler does not answer, or has cancelled a job.
         """
         suspects: list[Job] = []
         try:
@@ -86,7 +87,13 @@ class Cluster:
                 self._client.close(timeout=_CONNECT_SECONDS)
 
     def _all(self, waiting: deque[Job], suspects: list[Job]) -> Iterator[Outcome]:
-        """Run jobs. A few more are submitted than the workers can run, so that no worker waits."""
+        """Run jobs and yield their outcomes. About twice as many jobs are submitted as the workers
+        can run at once, so that no worker waits.
+
+        Args:
+            waiting: the jobs; they are removed.
+            suspects: gets the jobs that Dask gave up; these have no outcome.
+        """
         running: dict[Any, Job] = {}
         finished = self._dask.as_completed(loop=self._client.loop)
         try:

@@ -39,7 +39,16 @@ class JobsError(RisoriusError):
 
 @dataclass(frozen=True)
 class Options:
-    """Options that change the content of the outputs."""
+    """Options that change the content of the outputs.
+
+    Attributes:
+        parts: parts of the pose to write, from PARTS.
+        rate: frames per second to resample to; None: as in the clip.
+        frames: first and end (exclusive) of the frames after resampling; None: to the clip's end.
+        quaternions: True: rotations of joints are quaternions; False: Euler angles.
+        compress: True: the .npz is compressed.
+        mapping: the mapping of curves to controls.
+    """
 
     parts: tuple[str, ...] = DEFAULT_PARTS
     rate: float | None = None
@@ -66,7 +75,14 @@ class Job:
 
 @dataclass(frozen=True)
 class Plan:
-    """The content of a JOBS.toml, expanded to jobs."""
+    """The content of a JOBS.toml, expanded to jobs.
+
+    Attributes:
+        source: path of the JOBS.toml.
+        output: folder of the outputs and of the journal.
+        summary: paths of the summary's files, .csv or .json.
+        jobs: the jobs.
+    """
 
     source: Path
     output: Path
@@ -98,7 +114,17 @@ class _Table:
         return JobsError(f"{self._source}: {self._where}{key}: {text}")
 
     def take(self, key: str, expected: str, check: Callable[[Any], bool], default: Any) -> Any:
-        """The value of a key; a missing key gives `default`, or an error if `default` is None."""
+        """The value of a key, checked.
+
+        Args:
+            key: name of the key.
+            expected: the expected value in words, for the error.
+            check: function that says whether a value is valid.
+            default: value of a missing key; None makes a missing key an error.
+
+        Raises:
+            JobsError: the value is invalid, or the key is missing and has no default.
+        """
         if key not in self._values:
             if default is None:
                 raise self.error(key, f"{expected} was expected, found nothing")
@@ -109,7 +135,12 @@ class _Table:
         return value
 
     def texts(self, key: str, default: tuple[str, ...] | None) -> list[str]:
-        """A list of strings; a single string counts as a list of one."""
+        """A list of strings; a single string counts as a list of one.
+
+        Args:
+            key: name of the key.
+            default: value of a missing key; None makes a missing key an error.
+        """
         value = self.take(
             key, "a string or a list of strings",
             lambda v: isinstance(v, str) or _all_of(v, str), default,
@@ -125,7 +156,13 @@ class _Table:
     def choice(
         self, key: str, choices: tuple[str, ...], default: tuple[str, ...]
     ) -> tuple[str, ...]:
-        """The elements of `choices` that the table names, in the order of `choices`."""
+        """The elements of `choices` that the table names, in the order of `choices`.
+
+        Args:
+            key: name of the key.
+            choices: the allowed strings.
+            default: value of a missing key.
+        """
         texts = self.texts(key, default)
         for text in texts:
             if text not in choices:
@@ -145,9 +182,14 @@ def _all_of(value: Any, kind: type) -> bool:
 def read_jobs(source: Path) -> Plan:
     """Read a JOBS.toml and find the clips and characters that it names.
 
+    Args:
+        source: path of the JOBS.toml; paths in it are relative to its folder.
+
     Raises:
-        JobsError: the file cannot be read, a key or value is invalid, a pattern matches nothing, or
-            two jobs would write one file.
+        JobsError: the file cannot be read, a key or value is invalid, a pattern matches nothing,
+            there are more than MAX_JOBS jobs, or a job would write a file of another job, an input
+            or a file outside the output folder.
+        ReadingError: the file is too large, or a device.
     """
     try:
         values = toml.parse(toml.text_of(source))
@@ -239,9 +281,15 @@ def _mapping(table: _Table, base: Path) -> str | None:
 
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:
-    """The files that match the patterns in `key`. Raises: JobsError: a pattern has no match.
+    """The files that match the patterns in `key`, sorted by path.
 
-    The files are sorted by path.
+    Args:
+        table: the table with the key.
+        key: key of one pattern or a list of patterns.
+        base: folder to which the patterns are relative.
+
+    Raises:
+        JobsError: a pattern has no match, or two patterns match the same file.
     """
     out: dict[Path, tuple[_Found, str]] = {}
     for pattern in table.texts(key, None):
@@ -253,8 +301,10 @@ def _find(table: _Table, key: str, base: Path) -> list[_Found]:
             if path in out:
                 raise table.error(
                     key,
-                    f"each file once was expected, found {path} by {out[path][1]!r} and "
-                    f"{pattern!r}",
+                    (
+                        f"each file once was expected, found {path} by the patterns "
+                        f"{out[path][1]!r} and {pattern!r}"
+                    ),
                 )
             folder = os.path.relpath(path.parent, root).replace(os.sep, "/")
             out[path] = (_Found(path, "" if folder == "." else folder), pattern)
@@ -307,7 +357,14 @@ def _folder_name(folder: str) -> str:
 
 
 def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
-    """A path below the output folder. Empty path parts, as in "a//b", are dropped."""
+    """A path below the output folder. Empty path parts, as in "a//b", are dropped.
+
+    Args:
+        table: the table, for the error.
+        key: the key, for the error.
+        output: the output folder.
+        name: path relative to the output folder.
+    """
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
     rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
     if not parts or ".." in parts or rooted:
@@ -331,7 +388,8 @@ def _refuse_collisions(plan: Plan) -> None:
     taken = {_folded(path): "the summary" for path in plan.summary}
     if len(taken) < len(plan.summary):
         raise JobsError(
-            f"{plan.source}: summary: different files were expected, found a file twice"
+            f"{plan.source}: summary: different files were expected in this list, found a "
+            "file twice"
         )
     taken[_folded(plan.source)] = "this file itself"
     taken[_folded(plan.journal)] = "the journal"

@@ -51,7 +51,8 @@ def _serve(connection: Connection[object, object], work: Work) -> None:
 
 @contextlib.contextmanager
 def _ignoring_interrupts() -> Iterator[None]:
-    """Processes that start in this context ignore Ctrl-C."""
+    """Processes that start in this context ignore Ctrl-C; without effect outside the main
+    thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -116,7 +117,8 @@ class _Queue:
     def take(self, last: Job | None) -> Job | None:
         """Remove and return a worker's next job, or None if no job waits.
 
-        Jobs with the same face as `last` come first, and among them jobs with its clip.
+        Jobs with the face of `last` come first, and among them jobs with the clip of `last`. If no
+        job with this face waits, the face with the most waiting jobs is next.
         """
         face = _face_of(last) if last else None
         if face is None or not self._lengths[face]:
@@ -155,7 +157,8 @@ class Pool:
         Closing the iterator early, even by an exception, stops the workers.
 
         Raises:
-            PoolError: no worker can be started.
+            PoolError: workers end again and again before they have begun.
+            OSError: the system cannot start a process.
         """
         queue, left = _Queue(jobs), len(jobs)
         try:
@@ -208,7 +211,8 @@ class Pool:
         self._workers.append(_Worker(self._work))
 
     def _stop(self) -> None:
-        """Stop all workers, immediately if they have jobs; the caller deletes partial files."""
+        """Stop all workers, immediately if they have jobs or have not begun; the caller deletes
+        partial files."""
         for worker in self._workers:
             worker.connection.close()
             if worker.job is not None or not worker.ready:

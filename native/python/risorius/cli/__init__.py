@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The command line. Only this module prints errors, one sentence on the standard error.
+"""The command line. This module prints the error that ends a command, as one sentence on the
+standard error.
 
-Exit codes: 0 success, 1 bad input, 2 bad command line, 130 interrupted.
+Exit codes: 0 success; 1 bad input, or a command found errors, differences, failed jobs or missing
+controls and reported them; 2 bad command line; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -99,7 +101,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
     Raises:
         CommandLineError: an option has an invalid value.
-        SystemExit: the command line as a whole is invalid; the usage was printed.
+        SystemExit: the command line as a whole is invalid, or it asks for help or the version; the
+            text was printed.
     """
     parser = _Parser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)

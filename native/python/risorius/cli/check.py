@@ -36,7 +36,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _error(name: str, error: Exception, code: str = "io_read") -> risorius.Finding:
-    """A finding for the error that stopped reading; its text does not repeat the file's name."""
+    """A finding for the error that stopped reading; its text does not repeat the file's name.
+
+    Args:
+        name: name of the file.
+        error: the error.
+        code: code of the finding if the error has none.
+    """
     text = str(error).removeprefix(f"{name}: ")
     where, offset = getattr(error, "where", ""), getattr(error, "offset", None)
     text = text.removesuffix(f" (byte {offset})").removesuffix(f" [{where}]")
@@ -118,7 +124,8 @@ def lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _mixes(everything: list[dict[str, Any]], *, quiet: bool) -> None:
-    """Add to each valid file's results whether its face can be mixed with the first valid one."""
+    """Add to each valid file's results whether its face can be mixed with the first valid one, and
+    print this unless `quiet`. A face that cannot be mixed is not ok."""
     sound = [facts for facts in everything if facts["ok"]]
     first = risorius.load(sound[0]["file"]) if sound else None
     for facts in sound[1:]:

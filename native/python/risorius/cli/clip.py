@@ -211,7 +211,8 @@ def load(args: argparse.Namespace) -> importing.Imported:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Check the arguments before any file is read. Raises: CommandLineError."""
+    """Check the arguments before any file is read. Raises: CommandLineError; InputError if the
+    output cannot be written."""
     if args.full_value is not None and not 0.0 < args.full_value < 1e9:
         raise CommandLineError(f"--full-value: above 0 was expected, found {args.full_value:g}")
     if args.output.suffix.lower() not in OUTPUTS:
@@ -367,7 +368,7 @@ def run_mappings(args: argparse.Namespace) -> int:
         )
     target = args.output or Path(f"{args.write}.toml")
     if target.exists():
-        raise CommandLineError(f"{target}: it is there already")
+        raise CommandLineError(f"{target}: a new file was expected, but it is there already")
     importing.write_text(importing.mapping_text(args.write), target)
     print(target)
     return 0

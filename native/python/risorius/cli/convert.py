@@ -92,7 +92,8 @@ def _add_system(group: argparse._ArgumentGroup) -> None:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Check the options before the file is opened. Raises: CommandLineError."""
+    """Check the options before the file is opened. Raises: CommandLineError; InputError if the
+    output cannot be written."""
     if args.indent is not None and args.output_kind != "json":
         raise CommandLineError("--indent is only for JSON output")
     if not args.force:

@@ -16,7 +16,8 @@ _LINES = 8  # most lines per field without --all
 
 
 def same_but_for(a: str, b: str) -> Difference | None:
-    """The first byte that differs in two DNA files with equal content, or None.
+    """A Difference with the place of the first byte that differs in two DNA files with equal
+    content; None if all bytes are equal.
 
     Files with equal content can differ only in bytes that Risorius does not read.
 

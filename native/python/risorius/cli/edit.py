@@ -172,7 +172,8 @@ def parse_threshold(text: str) -> float | list[float]:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Check the options before the file is opened. Raises: CommandLineError."""
+    """Check the options before the file is opened. Raises: CommandLineError; InputError if an
+    output cannot be written."""
     if args.plot is not None and Path(args.plot).suffix.lower() not in _PLOTS:
         raise CommandLineError(
             f"--plot: a name ending in {' or '.join(_PLOTS)} was expected, found {args.plot!r}"

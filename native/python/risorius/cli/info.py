@@ -151,7 +151,8 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def _mixes(first: str, others: list[str], *, as_json: bool) -> int:
-    """Print whether each file can be mixed with the first one, or the reason why not."""
+    """Print whether each file can be mixed with the first one, or the reason why not. Returns the
+    exit code: 1 if a file cannot be mixed."""
     face = risorius.load(first)
     found = {name: difference(face, risorius.load(name)) for name in others}
     if as_json:

@@ -78,7 +78,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Check the options before the program listens. Raises: CommandLineError."""
+    """Check the options before the program listens. Raises: CommandLineError; InputError if the
+    output cannot be written."""
     if args.record is None:
         return
     require_suffix(args.record, _KINDS, "--record")
@@ -106,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
 def _save(take: Take, shaper: Shaper, path: Path) -> None:
     """Write the take; report dropped frames, and curves of the app that no control uses."""
     if not len(take):
-        raise InputError(f"{path} was not written: no face came")
+        raise InputError(f"{path} was not written: no face came from the app")
     if take.full:
         print(f"risorius: the take is full: {take.full} frames were left out", file=sys.stderr)
     if missed := take.unmapped(shaper):

@@ -62,7 +62,7 @@ def _run(args: argparse.Namespace, load: Callable[[argparse.Namespace], Imported
     require_suffix(args.output, (".toml",), "-o")
     refuse_same_file(str(args.input), str(args.output))
     if args.output.exists():
-        raise CommandLineError(f"{args.output}: it is there already")
+        raise CommandLineError(f"{args.output}: a new file was expected, but it is there already")
     require_writable(args.output)
     clip, _ = load(args).apply(args.mapping, rotations="none")
     found = _learn(clip, args.input, performance=args.performance, most_gain=args.most_gain)

@@ -84,7 +84,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Check the names of the files before the voice is analysed. Raises: CommandLineError."""
+    """Check the names of the files before the voice is analysed. Raises: CommandLineError;
+    InputError if an output cannot be written."""
     require_suffix(args.out, _KINDS, "-o")
     require_writable(args.out, args.phonemes)
     if args.text is not None and Path(args.text).is_file():

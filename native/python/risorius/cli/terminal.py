@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any, TextIO, cast
 
 # Control characters. Characters below 160 can change colours, the cursor and the window's title;
-# the others change the direction of text.
+# the others change the direction of text or break lines.
 _ORDERS = [*range(32), *range(127, 160), 0x61C, 0x200E, 0x200F, *range(0x2028, 0x202F)]
 _ORDERS += range(0x2066, 0x206A)
 _SPELLED = {

@@ -21,7 +21,8 @@ class UnknownControlError(RisoriusError):
 
 @dataclass(frozen=True)
 class Meaning:
-    """The controls that a typed name means: control -> factor of the typed value."""
+    """The controls that a typed name means: control -> factor of the typed value. `is_exact` is
+    True if the typed name is the full name of a control."""
 
     controls: dict[str, float]
     is_exact: bool
@@ -38,9 +39,10 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
 
     The text is compared with, in this order: full names; the parts of names after the last dot;
     ARKit units whose controls the file has; any part of a name, then of an ARKit unit; names in
-    other programs. Letter case counts for full names only. Two names that differ only in their
-    side (..L and ..R, ..Left and ..Right) are one meaning. The first comparison with a match
-    decides, and must give exactly one meaning.
+    other programs. Letter case counts for full names only; among parts after the last dot, equal
+    letter case comes first. If the text is a part of two names that differ only in their side (..L
+    and ..R, ..Left and ..Right), both are one meaning. The first comparison with a match decides,
+    and must give exactly one meaning.
 
     Args:
         text: text that a user typed.
@@ -102,7 +104,8 @@ def named(names: Sequence[str], index: int, kind: str) -> str:
 
 
 def _shapes_of_controls(dna: Dna) -> dict[int, str]:
-    """Control -> name of the first blend shape channel that it drives, in brackets."""
+    """Control -> name of the first blend shape channel that it drives, in brackets, with "..." if
+    it drives several."""
     table, names = dna.blend_shape_channels, dna.blend_shape_channel_names
     driven: dict[int, list[int]] = {}
     for control, channel in zip(
@@ -116,7 +119,14 @@ def _shapes_of_controls(dna: Dna) -> dict[int, str]:
 
 
 class ControlNames:
-    """Names of a file's controls, in the order: raw, correctives, networks' outputs, RBF poses."""
+    """Names of a file's controls, in the order: raw, correctives, networks' outputs, RBF poses.
+
+    Attributes:
+        names: the names; a corrective is called by its index and its first blend shape channel.
+        psd_begin: index of the first corrective.
+        psd_end: index after the last corrective, which is the first output of a network.
+        ml_end: index after the last output of a network, which is the first control of a pose.
+    """
 
     def __init__(self, dna: Dna) -> None:
         raw = dna.raw_control_names

@@ -24,7 +24,8 @@ Facts = dict[str, Any]
 def table_hits(
     table: risorius.Conditionals, rows: int, inputs: Doubles
 ) -> dict[int, list[tuple[int, Facts]]]:
-    """Find the rows of a conditional table whose interval contains their input.
+    """Find the rows of a conditional table whose interval contains their input. Of consecutive rows
+    with the same input and output, only the first match counts.
 
     Args:
         table: conditional table of the face.
@@ -90,7 +91,8 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD; correctives that nothing reads stay 0 at this LOD.
+    """Controls that joint groups, blend shape channels, animated maps or joints of networks read at
+    a LOD. A corrective that none of them reads stays 0 at this LOD.
 
     Args:
         dna: the face.
@@ -118,8 +120,13 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Active correctives, inactive ones of which exactly one control is not above 0, and ones that
-    nothing reads or that depend on themselves.
+    """The correctives in groups.
+
+    Returns:
+        "count": the number of correctives. "fire": active ones. "lack_one": inactive ones of
+        several controls, of which exactly one is not above 0, if something reads them at this LOD.
+        "rest_at_this_lod": ones that are inactive although all their controls are above 0, because
+        nothing reads them at this LOD or because they depend on themselves.
 
     Args:
         dna: the face.
@@ -247,7 +254,8 @@ def _on(indices: Sequence[int], controls: Doubles, names: ControlNames) -> list[
 
 
 def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) -> list[Facts]:
-    """Twist and swing setups whose angle is not 0: their angles in degrees, and their joints.
+    """Twist and swing setups whose angle is not 0: their angles in degrees, and their joints. A
+    setup that does not have four input controls is left out.
 
     Args:
         dna: the face.
@@ -285,7 +293,7 @@ def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) ->
 
 
 def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
-    """Angles of a quaternion (x, y, z, w) in degrees: twist about an axis, and swing."""
+    """Angles of a quaternion (x, y, z, w) from 0 to 180 degrees: twist about an axis, and swing."""
     axis = min(axis, 2)
     about, w = float(q[axis]), float(q[3])
     rest = math.hypot(*(float(q[a]) for a in range(3) if a != axis))
@@ -341,7 +349,8 @@ def explain_maps(
     lod: int,
     names: ControlNames,
 ) -> list[Facts]:
-    """Active animated maps; the one with the largest difference from its value at rest is first.
+    """Animated maps that are not 0; the one with the largest difference from its value at rest is
+    first.
 
     Args:
         dna: the face.

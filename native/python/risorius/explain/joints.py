@@ -15,7 +15,8 @@ from risorius import _native
 from ..controls.control_names import ControlNames, named
 from ..rigs.rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
 
-# Source of a contribution: index of a control, or name of a setup that combines several controls.
+# Source of a contribution: index of a control, or the name of a twist, of a swing, or "networks",
+# each of which combines several controls.
 Key = int | str
 Contributions = dict[int, dict[Key, Doubles]]
 """joint -> key -> float64[9]: tx ty tz rx ry rz sx sy sz in the file's units."""
@@ -112,7 +113,15 @@ def _product(
     rows: dict[int, int],
     controls: Doubles,
 ) -> dict[Key, Doubles]:
-    """Contributions of the columns of one joint, whose quaternions are multiplied in `order`."""
+    """Contributions of the columns of one joint, whose quaternions are multiplied in `order`.
+
+    Args:
+        convention: rotation convention of the file.
+        group: the joint group.
+        order: order in which the rotations of the columns are multiplied.
+        rows: axis (0 to 2) -> row of the group with the joint's rotation about this axis.
+        controls: float64[controls], of the pose.
+    """
     total, before = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
     out: dict[Key, Doubles] = {}
     for column in order.tolist():
@@ -176,7 +185,12 @@ def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
 
 def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | None, Doubles]:
     """The networks' rotation convention or None, and the matrix from the networks' axes to the
-    face's axes."""
+    face's axes.
+
+    Args:
+        dna: the face.
+        settings: key of a parameter of layer mlbe -> its value.
+    """
     if not all(key in settings for key in range(3, 10)):
         return None, np.eye(3)
     signs = tuple(1 if settings[key] == 1 else -1 for key in (6, 7, 8))
@@ -270,7 +284,8 @@ def explain_joints(
 
 
 def bone_length(dna: risorius.Dna) -> float:
-    """The median distance of a joint from its parent, in the file's translation unit."""
+    """The median distance of a joint from its parent, in the file's translation unit. Distances of
+    0 do not count; 1 if all are 0."""
     lengths = np.linalg.norm(np.asarray(dna.neutral_joint_translations, float), axis=1)
     lengths = lengths[lengths > 0]
     return float(np.median(lengths)) if len(lengths) else 1.0

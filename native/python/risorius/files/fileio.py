@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Atomic writing of files; the package writes files only through this module."""
+"""Atomic writing of files. Python code writes its outputs through this module, except journals,
+which grow line by line."""
 
 from __future__ import annotations
 
@@ -76,7 +77,7 @@ class _Named(io.FileIO):
 
 
 def write_bytes(path: _Path, data: ReadableBuffer) -> None:
-    """Write a file atomically, see replacing().
+    """Write a file that receives its name when it is complete and on disk, as by replacing().
 
     Args:
         path: path of a file in an existing folder.
@@ -90,7 +91,7 @@ def write_bytes(path: _Path, data: ReadableBuffer) -> None:
 
 
 def write_text(path: _Path, text: str) -> None:
-    """Write a text file atomically, see replacing().
+    """Write a text file that receives its name when it is complete and on disk, as by replacing().
 
     Args:
         path: path of a file in an existing folder.
@@ -110,7 +111,8 @@ def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
             removed again if writing fails.
 
     Raises:
-        OSError: a file cannot be written; then no file is changed.
+        OSError: a file cannot be written. No file is changed then, except if the error occurs
+            while the complete files receive their names.
     """
     made: list[Path] = []
     try:
@@ -179,6 +181,7 @@ def check_writable(path: _Path, *, parents: bool = False) -> None:
     """Check before long work whether replacing(path) will be possible.
 
     Args:
+        path: path of a file; an existing file is not changed.
         parents: True: missing folders are allowed, because they will be made.
 
     Raises:

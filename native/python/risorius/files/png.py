@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads and writes PNG files in this package's form: 8 bits, grey or colour, filters 0 to 2."""
+"""Reads and writes PNG files in this package's form: 8 bits, grey, colour, or colour with opacity,
+filters 0 to 2."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ def png(image: Floats) -> bytes:
 
 
 def pixels_to_png(image: Pixels) -> bytes:
-    """The same as png, for an image of uint8 from 0 to 255."""
+    """An 8-bit PNG of an image, uint8 [h, w], [h, w, 3] or [h, w, 4], from 0 to 255. Row 0 is the
+    bottom, as in png()."""
     height, width = image.shape[:2]
     values = 1 if image.ndim == 2 else image.shape[2]
     kind = {1: 0, 3: 2, 4: 6}[values]
@@ -90,11 +92,14 @@ def read_png(data: bytes) -> Floats | None:
 
 
 def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
-    """The same as read_png, with values of uint8 from 0 to 255.
+    """Read an image that `png` wrote, as uint8 from 0 to 255; None for other or damaged files.
 
     Args:
         data: the bytes of the file.
         opacity: True: also read images [h, w, 4], whose fourth value is the opacity.
+
+    Returns:
+        uint8[h, w], [h, w, 3] or [h, w, 4]; row 0 is the bottom.
     """
     shape = pixels_of(data, opacity=opacity)
     if shape is None:
@@ -112,11 +117,11 @@ def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
 def pixels_of(data: bytes, *, opacity: bool = False) -> tuple[int, int, int] | None:
     """Height, width and values per pixel that a file declares.
 
-    None if read_png cannot read the file.
+    None if these numbers, or the declared format, show that read_pixels cannot read the file.
 
     Args:
         data: the bytes of the file.
-        opacity: see read_pixels.
+        opacity: True: also accept images of colour with opacity.
     """
     width, height, depth, kind = _header(data)
     values = ({0: 1, 2: 3, 6: 4} if opacity else {0: 1, 2: 3}).get(kind, 0)

@@ -54,7 +54,8 @@ class Combination:
         name: name of its morph target.
         of: names of the targets that drive it.
         weight: formula of its weight, one of the constants PRODUCT to SHUT of this file.
-        error_mm: largest deviation of the linear sum from the rig in mm, without this combination.
+        error_mm: largest deviation of the linear sum from the rig in mm, without this combination;
+            0 if it was not measured, as for the combinations of Refiner.
     """
 
     name: str
@@ -97,7 +98,8 @@ class Sums:
         return found.astype(np.float32)
 
     def errors(self, group: str) -> list[Combination]:
-        """Combinations for pairs of targets and for single targets, largest deviation first.
+        """Combinations for pairs of targets and for single targets, largest deviation first. Of
+        more than _TRIED (2000) pairs, at most 2000 are tried, spread evenly.
 
         Args:
             group: name of the group of targets.
@@ -119,7 +121,8 @@ class Sums:
         return sorted(out, key=lambda one: -one.error_mm)
 
     def apart(self, of: tuple[str, ...], kind: str = PRODUCT) -> float:
-        """The largest deviation of a linear sum of targets from the rig, in mm.
+        """The largest deviation of a linear sum of targets from the rig in mm, at the target
+        weights at which the combination's weight is largest.
 
         Args:
             of: names of the targets.
@@ -142,7 +145,8 @@ class Sums:
         return self._points.at(np.clip(raw, -1.0, 1.0)) - linear
 
     def _missing_on_top(self, kind: str, top: Target, of: tuple[str, ...]) -> Doubles:
-        """`_missing` for a target such as mouthClose, which takes back a share of another target.
+        """float64[P, 3]: rig minus linear sum in metres, as _missing(), for a target such as
+        mouthClose, which takes back a share of another target.
 
         Args:
             kind: formula of the weight.

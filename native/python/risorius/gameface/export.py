@@ -118,6 +118,13 @@ def _within(
 ) -> tuple[Written, Wishes]:
     """The file within the size limit, and the reduced options that it was made with.
 
+    Args:
+        maker: makes the file.
+        written: the file without reductions.
+        wishes: the options of the user.
+        levels: number of LODs.
+        face: name of the face for errors.
+
     Raises:
         GameFaceError: the file is still too large with every reduction.
     """
@@ -247,7 +254,12 @@ class _Maker:
             self._refine(wishes, room - len(self.made))
 
     def _refine(self, wishes: Wishes, room: int) -> None:
-        """Adds combinations for deviations that the pairs' combinations leave at typical poses."""
+        """Adds combinations for deviations that the pairs' combinations leave at typical poses.
+
+        Args:
+            wishes: the options of the user.
+            room: largest number of additional combinations.
+        """
         mine = [t for t in self._targets if t.group == "arkit"]
         names = [t.name for t in mine]
         poses = faces.typical(names, POSES)
@@ -304,7 +316,8 @@ class _Maker:
         return found, move
 
     def lines(self, written: Written) -> list[str]:
-        """One line per group: numbers of targets and vertices, bytes, deviation of linear sums."""
+        """One line per group of targets, and for combinations: number of targets, vertices and
+        bytes, deviation of linear sums from the rig."""
         out = []
         for group, found in self._found.items():
             tried, there = self._sums.tried[group]

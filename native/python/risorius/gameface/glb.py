@@ -27,8 +27,10 @@ class Glb:
     Attributes:
         table: the JSON; callers append nodes and meshes to its lists.
         packs: whether vertices and triangles are packed with meshoptimizer.
-        sparse: whether an accessor whose rows are mostly zero stores only the nonzero rows.
-        pictures: name of a picture file of the face -> number of the texture made from it.
+        sparse: whether an accessor of a morph target whose rows are mostly zero stores only the
+            nonzero rows; without effect if `packs` is set.
+        pictures: name of a picture file of the face without suffix, "_" and the role of the picture
+            -> number of the texture made from the file.
     """
 
     def __init__(self, *, packs: bool = False, sparse: bool = False) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Measures values of VRM expressions on a face.
 
-These are the angles of the gaze, and the presets that must fade out while an emotion preset is
+The values are the angles of the gaze, and the presets that must fade out while an emotion preset is
 active, because the sum of the two presets' morph targets would deform the face.
 """
 
@@ -47,7 +47,7 @@ def measured(points: Points, sums: Sums, targets: Mapping[str, Target]) -> Manne
 
 
 def _turn(points: Points, delta: npt.NDArray[np.float32]) -> float:
-    """Mean rotation of the eyeballs by a target, in degrees; 0 for a face without eyes.
+    """Mean rotation of the eyeballs that a target moves, in degrees; 0 if it moves none.
 
     Args:
         points: vertices of the LOD, in the rest pose.

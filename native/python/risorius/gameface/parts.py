@@ -61,7 +61,8 @@ class Points:
 
     Attributes:
         parts: the meshes that have triangles.
-        rest: float64[P, 3], rest positions in metres; y up, the face looks along z.
+        rest: float64[P, 3], rest positions in metres; y up, the face looks along z, or along -z in
+            VRM 0.x.
         axes: the result of axes_of.
     """
 
@@ -108,8 +109,8 @@ class Points:
         found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():
             raise GameFaceError(
-                f"{self._face}: vertices nearer than 10 km were expected, "
-                "one is no number or farther"
+                f"{self._face}: vertices within 10 km of the origin were expected, one is no "
+                "number or farther away"
             )
         return found
 
@@ -152,7 +153,8 @@ def axes_of(dna: Dna, *, faces_back: bool = False) -> Doubles:
     Positions in glTF are `points @ axes.T`.
 
     Args:
-        dna: its metadata names axes and unit.
+        dna: the face, with the names of its axes and its unit. Unknown axes count as right, up,
+            front, and an unknown unit as cm.
         faces_back: whether the face looks along -z, as in VRM 0.x.
     """
     words = dna.coordinate_system

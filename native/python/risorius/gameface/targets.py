@@ -43,7 +43,8 @@ class Target:
 
 
 def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Target], list[str]]:
-    """The targets of the requested groups, and a note for each control that the rig lacks.
+    """The targets of the requested groups, and notes on targets that are left out or approximated
+    because the rig lacks controls, or renamed.
 
     Args:
         rig: the compiled face.

@@ -64,7 +64,7 @@ class Packed:
                 data = memoryview(zlib.decompressobj().decompress(data, wanted + 1))
             except zlib.error as error:
                 raise self.parser.fail(
-                    self.at, f"an array that zlib packed was expected: {error}"
+                    self.at, f"an array packed with zlib was expected: {error}"
                 ) from error
         if len(data) != wanted:
             raise self.parser.fail(
@@ -91,7 +91,8 @@ class Node:
         return value.unfold() if isinstance(value, Packed) else np.zeros(0)
 
     def length(self, name: str) -> int:
-        """The array's length that the file states, before the array is unpacked."""
+        """The length that the file states for the array of a nested record, before the array is
+        unpacked; 0 if there is none."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.count if isinstance(value, Packed) else 0
@@ -114,7 +115,7 @@ class Parser:
         data: the whole file.
         name: the file's name in errors.
         budget: limits memory and work.
-        skipped: kinds of objects whose records are not read.
+        skipped: kinds of objects whose nested records are not read.
     """
 
     def __init__(
@@ -142,7 +143,7 @@ class Parser:
         return AnimationFileError(self.name, f"byte {at}: {message}")
 
     def top(self) -> dict[str, Node]:
-        """The records named in _TOP, by name."""
+        """The records GlobalSettings, Objects and Connections, by name, if the file has them."""
         return {node.name: node for node in self._records(27, len(self.data), 0)}
 
     def _records(self, at: int, end: int, depth: int) -> Iterator[Node]:
@@ -210,6 +211,8 @@ class Scene:
     """The settings, objects and connections of a file.
 
     Attributes:
+        name: the file's name in errors.
+        ticks: units of the key times per second.
         settings: GlobalSettings, or None.
         objects: id -> record.
         parents: id -> (parent's id, connected property or "") of each connection, in file order.
@@ -249,6 +252,8 @@ class Scene:
 def read(data: bytes, name: str, take: str | None = None, budget: Budget | None = None) -> Take:
     """The curves of one animation stack, which FBX software shows as a take or clip.
 
+    A file without stacks gives all its curves.
+
     The curve of a blend shape channel has the channel's name, with its percentage as a fraction.
     The curve of a property has the property's name, whichever node has it, because exporters of
     rigs put such properties on any node. A node whose name begins with CTRL_ is a slider of a face
@@ -257,7 +262,8 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
     Args:
         data: the whole file.
         name: the file's name in errors.
-        take: name or number of a stack; None: the first stack with curves of these three kinds.
+        take: name of a stack, or its number from 0; None: the first stack with curves of these
+            three kinds.
         budget: limits memory and work; None: a limit by the size of the file.
 
     Raises:
@@ -337,13 +343,22 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
     for number, (identity, node) in enumerate(stacks.items()):
         if take in (object_name(node), str(number)):
             return [identity]
-    raise AnimationFileError(scene.name, f"an animation {take!r} was expected, found none")
+    raise AnimationFileError(
+        scene.name, f"an animation {take!r} was expected, found none with this name or number"
+    )
 
 
 def _curves(
     scene: Scene, stack: int, components: dict[int, list[tuple[str, int]]], channels: set[str]
 ) -> dict[str, Keys]:
-    """Name -> keyframes of the curves that a stack animates; all curves if `stack` is 0."""
+    """Name -> keyframes of the curves that a stack animates; all curves if `stack` is 0.
+
+    Args:
+        scene: the file; its notes get sentences about curves that are left out.
+        stack: id of the animation stack, or 0.
+        components: id of an AnimationCurveNode -> (component, id of the curve) per curve.
+        channels: names of the blend shape channels.
+    """
     out: dict[str, Keys] = {}
     bones = 0
     for identity, parts in components.items():
@@ -354,7 +369,8 @@ def _curves(
             continue
         for owner, way in _owners(scene, links):
             if owner.name == "Geometry" and way in channels:
-                # a copy of the blend shape's percentage, which exporters add for other software
+                # This is a copy of the blend shape's percentage, which exporters add for other
+                # software.
                 continue
             scene.budget.work(len(parts), "connections")
             named = _named(scene, owner, way, parts)
@@ -385,7 +401,12 @@ def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
 
 
 def _owners(scene: Scene, links: Sequence[tuple[int, str]]) -> list[tuple[Node, str]]:
-    """(object, property) for each of `links` that ends at a property of an object."""
+    """(object, property) for each of `links` that ends at a property of an object.
+
+    Args:
+        scene: the file.
+        links: (parent's id, connected property or "") of each connection.
+    """
     return [(scene.objects[i], way) for i, way in links if way and i in scene.objects]
 
 
@@ -396,7 +417,17 @@ def _in_stack(scene: Scene, layer: int, stack: int) -> bool:
 def _named(
     scene: Scene, owner: Node, way: str, parts: Sequence[tuple[str, int]]
 ) -> list[tuple[str, Keys]]:
-    """(name of a curve, its keyframes) for an animated property; empty for a bone's transform."""
+    """(name of a curve, its keyframes) for an animated property.
+
+    The list is empty for location, rotation and scale of a node, except the location of a node
+    whose name begins with CTRL_.
+
+    Args:
+        scene: the file.
+        owner: the object with the property.
+        way: name of the property.
+        parts: (component such as "d|X", id of the curve) of each component.
+    """
     name = object_name(owner)
     if way == "DeformPercent":
         return [(name, _scaled(scene, scene.keys(curve), 0.01)) for _, curve in parts[:1]]
@@ -421,8 +452,14 @@ def _scaled(scene: Scene, keys: Keys, factor: float) -> Keys:
 def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
     """Reads the keyframes of an AnimationCurve.
 
+    Args:
+        scene: the file.
+        node: record of the AnimationCurve.
+        notes: receives a sentence if weighted tangents are read as unweighted ones.
+
     Raises:
-        AnimationFileError: numbers of times and values differ, or times do not ascend.
+        AnimationFileError: numbers of times and values differ, a value is not finite, or times do
+            not ascend.
     """
     ticks = node.array("KeyTime")
     scene.budget.hold(ticks.size * _KEY_BYTES, f"{ticks.size} keys")
@@ -454,8 +491,13 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
     """int64[count] and float64[count, 2]: the flags of each keyframe, and two slopes.
 
-    They are the slope after the keyframe and the slope before the next one. The file stores them
-    once for each run of consecutive keyframes with the same flags and slopes.
+    The slopes are the one after the keyframe and the one before the next keyframe. The file stores
+    flags and slopes once for each run of consecutive keyframes that share them. If the runs are
+    damaged or do not sum to `count`, all keyframes are linear.
+
+    Args:
+        node: record of the AnimationCurve.
+        count: number of keyframes.
     """
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
@@ -475,7 +517,8 @@ def _auto(
 ) -> tuple[Doubles, Doubles]:
     """Sets the slopes of keyframes with automatic tangents.
 
-    The slope is that of the line through the two neighbouring keyframes, or 0 at a clamped extreme.
+    The slope is that of the line through the two neighbouring keyframes (at the ends: through the
+    keyframe and its only neighbour), or 0 at a clamped extreme.
 
     Args:
         times, values: float64[keys], seconds and values of the keys.

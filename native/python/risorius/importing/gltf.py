@@ -98,7 +98,8 @@ class Document:
             raise self.fail(f"{place}.{key}", str(error)) from None
 
     def numbers(self, index: object, place: str) -> Doubles:
-        """float64[count]: the values of a scalar accessor; normalised integers become fractions.
+        """float64[count]: the values of a scalar accessor; integers become fractions of the
+        largest integer of their type.
 
         Repeated calls return the same array, because a thousand channels may share one.
 
@@ -127,7 +128,10 @@ class Document:
         if self.whole(view, "byteStride", view_at, dtype.itemsize) != dtype.itemsize:
             raise self.fail(
                 view_at,
-                f"numbers close together were expected, found the byteStride {view['byteStride']}",
+                (
+                    "numbers close together were expected, without the gaps of the "
+                    f"byteStride {view['byteStride']}"
+                ),
             )
         found = self._viewed(accessor, at, dtype, (count, 1))[:, 0]
         self.budget.hold(count * 3 * 8, at)
@@ -188,7 +192,14 @@ class Document:
     def _put_sparse(
         self, sparse: Mapping[str, Any], at: str, dtype: np.dtype[Any], out: Doubles
     ) -> None:
-        """Writes the rows of a sparse accessor into `out`."""
+        """Writes the rows of a sparse accessor into `out`.
+
+        Args:
+            sparse: table `sparse` of the accessor.
+            at: place of the table in the JSON, for errors.
+            dtype: type of the stored components.
+            out: float64[count, n], values of the accessor; changed.
+        """
         count = self.whole(sparse, "count", at)
         parts = [sparse.get("indices"), sparse.get("values")]
         if not all(isinstance(part, dict) for part in parts):
@@ -211,7 +222,14 @@ class Document:
     def _viewed(
         self, table: Mapping[str, Any], at: str, dtype: np.dtype[Any], shape: tuple[int, int]
     ) -> npt.NDArray[Any]:
-        """An array of `shape` at a table's bufferView and byteOffset, with the view's stride."""
+        """An array of `shape` at a table's bufferView and byteOffset, with the view's stride.
+
+        Args:
+            table: table with a bufferView and byteOffset: an accessor, or a part of a sparse one.
+            at: place of the table in the JSON, for errors.
+            dtype: type of the stored components.
+            shape: number of rows, and of components per row.
+        """
         number = table.get("bufferView")
         view = self.item("bufferViews", number, at)
         view_at = f"bufferViews[{number}]"
@@ -233,7 +251,12 @@ class Document:
         return np.ndarray(shape, dtype, data, start + inside, (stride, dtype.itemsize))
 
     def _part(self, index: object, place: str) -> tuple[bytes, int, int]:
-        """(bytes, offset, length) of a buffer view's content, unpacked if it is packed."""
+        """(bytes, offset, length) of a buffer view's content, unpacked if it is packed.
+
+        Args:
+            index: index of the buffer view, as in the file.
+            place: place of the index in the JSON, for errors.
+        """
         view = self.item("bufferViews", index, place)
         view_at = f"bufferViews[{index}]"
         number = int(index)  # type: ignore[call-overload]  # item says it is one
@@ -252,7 +275,12 @@ class Document:
         return out, 0, len(out)
 
     def _stored(self, table: Mapping[str, Any], place: str) -> tuple[bytes, int, int]:
-        """(buffer, byteOffset, byteLength) of a table."""
+        """(buffer, byteOffset, byteLength) of a table.
+
+        Args:
+            table: table of the JSON that names a buffer and a range of its bytes.
+            place: place of the table in the JSON, for errors.
+        """
         data = self._buffer(table.get("buffer"), place)
         start, size = (self.whole(table, key, place) for key in ("byteOffset", "byteLength"))
         if start + size > len(data):
@@ -312,7 +340,7 @@ class Document:
     def linked(self, uri: object, place: str) -> bytes:
         """The bytes that a uri contains in base64, or the bytes of the file that it names.
 
-        The file must be in the folder of the glTF.
+        The file must be in the folder of the glTF, or in a folder inside that folder.
 
         Args:
             uri: uri of a buffer or a picture, as in the file; may be of any type.
@@ -330,7 +358,8 @@ class Document:
             except (binascii.Error, ValueError) as error:
                 raise self.fail(place, f"base64 was expected: {error}") from error
         file = unquote(uri)
-        # Only files in the glTF's folder are read, because a uri could name any file on the disk.
+        # Only files in the glTF's folder or below it are read, because a uri could name any file on
+        # the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(
                 place,
@@ -411,7 +440,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
         budget: limits memory and work; None: by the size of the file.
 
     Raises:
-        AnimationFileError: not a GLB of version 2, or a truncated file.
+        AnimationFileError: not a GLB of version 2, a truncated file, or no valid JSON in it.
     """
     budget = budget or Budget.of(len(data))
     name = str(path)
@@ -483,17 +512,18 @@ def read(document: Document, take: str | None = None) -> Take:
     """The curves of one animation.
 
     The curve of a morph target has the target's name from extras.targetNames of its mesh, which
-    exporters write, else "mesh.number". The curve of a property that KHR_animation_pointer animates
-    has the last name of its pointer. Meshes that share a target's name normally move together: only
-    one curve is taken.
+    exporters write, else "mesh.number". The curve of a custom property (in extras) that
+    KHR_animation_pointer animates has the last name of its pointer. Meshes that share a target's
+    name normally move together: only the first curve is taken.
 
     Args:
         document: from `open_glb` or `open_gltf`.
-        take: name or number of an animation; None: the first one that animates morph targets
-            or such properties.
+        take: name of an animation, or its number from 0; None: the first one that animates morph
+            targets or such properties.
 
     Raises:
-        AnimationFileError: no such animation, or missing parts of it.
+        AnimationFileError: no such animation, none that animates morph targets or such
+            properties, or missing parts of it.
     """
     notes: list[str] = []
     animations = document.json.get("animations")
@@ -528,7 +558,9 @@ def _chosen(document: Document, animations: Sequence[Any], take: str | None) -> 
     for i, animation in enumerate(animations):
         if isinstance(animation, dict) and take in (animation.get("name"), str(i)):
             return [i]
-    raise AnimationFileError(document.name, f"an animation {take!r} was expected, found none")
+    raise AnimationFileError(
+        document.name, f"an animation {take!r} was expected, found none with this name or number"
+    )
 
 
 def _curves(
@@ -566,7 +598,14 @@ def _is_same(a: Keys, b: Keys) -> bool:
 
 
 def _names(document: Document, target: Mapping[str, Any], place: str) -> list[str]:
-    """Names of the curves of an animation channel; empty for a node's location, rotation, scale."""
+    """Names of the curves of an animation channel; empty if the channel animates neither morph
+    targets nor custom properties, but for example a node's location.
+
+    Args:
+        document: the glTF.
+        target: the table `target` of the channel.
+        place: place of the channel in the JSON, for errors.
+    """
     if target.get("path") == "weights":
         node = document.item("nodes", target.get("node"), f"{place}.target.node")
         return _target_names(document, node.get("mesh"), place)
@@ -585,7 +624,8 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
             return names
         if not parts[3].isdigit() or int(parts[3]) >= len(names):
             raise document.fail(
-                place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
+                place,
+                (f"a weight of {len(names)} was expected, found {path[:80]!r}"),
             )
         return [names[int(parts[3])]]
     # Custom properties of a rig are in "extras". Other animated properties, such as colours, are
@@ -613,7 +653,15 @@ def _keys(
     names: Sequence[str],
     place: str,
 ) -> list[Keys]:
-    """The keyframes of each curve of an animation channel, in the order of `names`."""
+    """The keyframes of each curve of an animation channel, in the order of `names`.
+
+    Args:
+        document: the glTF.
+        animation: table of the animation.
+        channel: table of the animation channel.
+        names: names of the channel's curves.
+        place: place of the channel in the JSON, for errors.
+    """
     samplers, index = animation.get("samplers"), channel.get("sampler")
     if not isinstance(samplers, list) or not isinstance(index, int):
         raise document.fail(place, f"a sampler was expected, found {index!r}")

@@ -52,7 +52,7 @@ class Reader:
         """
         found = math.nan
         if isinstance(value, int | float | str) and not isinstance(value, bool):
-            try:  # some write numbers as text
+            try:  # some programs write numbers as text
                 found = float(value)
             except (ValueError, OverflowError):
                 found = math.nan
@@ -121,7 +121,8 @@ class Reader:
         return rate
 
     def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
-        """float64[count]: seconds of frames, from given times, else from 0 at the rate.
+        """float64[count]: seconds of frames, from given times; without times, or if the caller's
+        unit is rows, from 0 at the rate.
 
         Args:
             given: a list of times from the JSON, or None.
@@ -149,12 +150,13 @@ class Reader:
 
         Args:
             names: names of the curves, each once.
-            rows: float[controls, frames]; NaN for missing values.
+            rows: float[names, frames]; NaN for missing values, which are interpolated.
             times: float64[frames], seconds.
             rate: frames per second; None: inferred from the times.
 
         Raises:
-            AnimationFileError: a repeated name.
+            AnimationFileError: a repeated name, a curve in which all values are missing, or times
+                of which more than a third do not ascend.
         """
         if len(set(names)) != len(names):
             twice = next(name for name in names if list(names).count(name) > 1)

@@ -88,7 +88,7 @@ class Mapping:
             is divided by the value of B (controls.shares.share_of). A is left unchanged if no curve
             moves B.
         controls: pattern of control names -> adjustment; the last match counts.
-        strip: prefixes of curve names that are ignored.
+        strip: prefixes that are removed from curve names.
         vocabulary: name in controls.vocabulary; its other spellings are accepted too.
         is_loose: whether names match regardless of letter case, "_" and Left or L at the end.
         is_gui: whether the controls are GUI controls, which the rig's table converts to raw ones.
@@ -111,7 +111,11 @@ class Mapping:
         return tuple(dict.fromkeys(control for row in self.rows.values() for control in row))
 
     def finder(self) -> Callable[[str], tuple[str, Row] | None]:
-        """A function from a curve's name to (name of its row, {control: weight}), or None."""
+        """A function from a curve's name to (key, {control: weight}), or None.
+
+        The key is the name of the row or, if the row's name is a pattern, the spelling of the
+        curve's name that the pattern matches.
+        """
         exact = {loose_name(key) if self.is_loose else key: key for key in self.rows}
         exact.pop("", None)  # names without letters are all equal here
         patterns = [key for key in self.rows if "*" in key]
@@ -135,8 +139,8 @@ class Mapping:
     def _spellings(self, name: str) -> Iterator[str]:
         """The spellings under which a name is searched.
 
-        These are the name itself, the name without known prefixes, the name without a mesh's name
-        before it, and the vocabulary's spelling.
+        The spellings are the name itself, the name without known prefixes, the name without a
+        mesh's name before it (if names match loosely), and the vocabulary's spelling.
         """
         yield name
         for start in self.strip:
@@ -160,7 +164,16 @@ class Mapping:
 
 @dataclass
 class Mapped:
-    """A mapped clip, the controls that each source curve moves, and the curves not used."""
+    """A mapped clip, the controls that each source curve moves, and the curves not used.
+
+    Attributes:
+        clip: curves of controls.
+        mapped: curve of the source -> controls that it moves.
+        unmapped: curves of the source that the mapping does not know.
+        ignored: curves of the source with an empty row, or whose row another curve has used.
+        absent: names of rows, other than patterns and empty rows, without a curve in the source.
+        notes: sentences for the user about curves that are left out.
+    """
 
     clip: Clip
     mapped: dict[str, tuple[str, ...]]
@@ -173,9 +186,14 @@ class Mapped:
 def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
     """Applies a mapping to a clip of a file's curves; the result has curves of controls.
 
-    Weighted curves for the same control are summed. A control that is a share of another is divided
+    Weighted curves for the same control are summed. If several curves match one row, only the first
+    is used, and the others are listed as ignored. A control that is a share of another is divided
     by it, then adjusted. Values stay bitwise equal if one curve moves a control with weight 1,
     without share or adjustment.
+
+    Args:
+        mapping: the mapping.
+        clip: curves with the file's own names.
 
     Raises:
         BudgetError: too many controls or patterns for the size of the clip.
@@ -229,7 +247,14 @@ def _divided(
 ) -> tuple[Clip, dict[str, Doubles]]:
     """Divides each control of `mapping.shares` by the control of which it takes back a share.
 
-    The clip gets more frames if its keyframes are far apart, see `_between`.
+    The clip gets more frames if its keyframes are far apart, because a quotient of linear curves is
+    not linear between keyframes.
+
+    Args:
+        mapping: the mapping with the shares.
+        clip: the clip, of which frame times are used and may be replaced.
+        sums: control -> float64[frames], its curve before the division.
+        budget: budget of the clip.
     """
     place = f"mapping {mapping.name}"
     shares = [(c, w) for c, w in mapping.shares.items() if c in sums and w in sums]
@@ -266,7 +291,10 @@ def _between(times: Doubles) -> Doubles | None:
 
 
 def fits(control: str, pattern: str) -> bool:
-    """Whether a pattern with * and ? matches a control's name or its short name; case counts."""
+    """Whether a pattern with * and ? matches a control's name; case counts.
+
+    The name may be written without "CTRL_expressions." at its beginning.
+    """
     short = control.partition(".")[2] if control.startswith("CTRL_expressions.") else control
     return fnmatch.fnmatchcase(control, pattern) or fnmatch.fnmatchcase(short, pattern)
 
@@ -322,7 +350,7 @@ def mapping_text(name: str) -> str:
 
 
 def load_mapping(source: str | os.PathLike[str] | Mapping) -> Mapping:
-    """Loads a built-in mapping by name, or a TOML file.
+    """Loads a built-in mapping by name, or a TOML file; a Mapping is returned unchanged.
 
     Raises:
         MappingError: missing, not TOML, or inconsistent rows; the message names the place.
@@ -358,7 +386,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
         name: the mapping's name, unless the text has one.
 
     Raises:
-        MappingError: see load_mapping.
+        MappingError: not TOML, an unknown key, or inconsistent rows; the message names the place.
     """
     try:
         table = toml.parse(text)
@@ -373,7 +401,10 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
     rows |= {key: {} for key in _texts(table, "ignore", where)}
     for key in mapping.rows:  # a row of the base is replaced only by exactly its name
         if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
-            raise MappingError(where, f"rows: {key} is in the base with another spelling")
+            raise MappingError(
+                where,
+                (f"rows: {key} is in the base with another spelling: use the spelling of the base"),
+            )
     shares = _shares(_table(table, "shares", where), prefix, where)
     controls = {
         key: _adjustment(key, value, where)
@@ -398,10 +429,14 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 
 
 def _base(table: Table[str, Any], where: str) -> Mapping:
-    """The mapping that the key `base` of a TOML table names; the table's rows are added to it.
+    """The mapping that the key `base` of a TOML table names, or an empty one without this key.
 
     "vocabulary NAME" means the names of a vocabulary of controls.vocabulary. For ARKit and VRM the
     ARKit units are included.
+
+    Args:
+        table: the mapping as TOML.
+        where: name of the mapping in errors.
     """
     base = _text(table, "base", where)
     if not base:
@@ -468,6 +503,12 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
     "@PP" means the controls of the expression PP. A control ending in * means the controls of both
     sides, one ending in ** the controls of the four lip quarters, unless the row's key contains a
     *. A name without a dot gets the prefix.
+
+    Args:
+        key: name of the curve in the source.
+        value: value of the row in the TOML: {control: weight}, or the name of an expression.
+        prefix: text before names of controls without a dot.
+        where: name of the mapping in errors.
     """
     if isinstance(value, str):
         value = {"@" + value: 1.0}
@@ -492,13 +533,23 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
             out[name] = out.get(name, 0.0) + weight * part
     if "*" not in key and any("*" in control for control in out):
         raise MappingError(
-            where, f"rows.{key}: a * was expected at the end of a control, or in both"
+            where,
+            (
+                f"rows.{key}: a * was expected at the end of a control, or in both the curve and "
+                "the control"
+            ),
         )
     return out
 
 
 def _expression(name: str, at: str, where: str) -> Table[str, float]:
-    """Control -> weight of an expression."""
+    """Control -> weight of an expression.
+
+    Args:
+        name: name of the expression.
+        at: place in the TOML, for errors.
+        where: name of the mapping in errors.
+    """
     try:
         return expressions.get(name).weights
     except ValueError as error:
@@ -510,6 +561,11 @@ def _shares(table: Table[str, Any], prefix: str, where: str) -> dict[str, str]:
 
     "" instead of a control removes an entry of the base mapping. A share of a share is an error,
     because the result would depend on the order of the divisions.
+
+    Args:
+        table: the table `shares` of the TOML.
+        prefix: text before names of controls without a dot.
+        where: name of the mapping in errors.
     """
     out: dict[str, str] = {}
     for key, value in table.items():
@@ -574,11 +630,12 @@ def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
 
 
 def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> str | None:
-    """The built-in mapping that knows the most curves in `names`; None if no mapping knows any.
+    """The name of the built-in mapping that knows the most curves in `names`, or None.
 
     Ties go to the mapping that knows more names in `columns`, then to the one with fewer rows,
-    which is more specific. Single letters are no evidence, because several vocabularies use them as
-    mouth shapes; but the vowels A, I, U, E, O together mean VRM.
+    which is more specific. A mapping that knows only single letters is not chosen, because several
+    vocabularies use them as mouth shapes; but the vowels A, I, U, E, O together mean VRM. A file
+    with nearly all ARKit units is not VRM.
 
     Args:
         names: curves that are not constantly 0.

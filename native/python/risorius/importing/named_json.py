@@ -91,7 +91,7 @@ def read(
 
 
 def own_clip(reader: Reader, document: object) -> Take | None:
-    """Reads the layout of `importing.json_text`; None if the document has another one.
+    """Reads the clip JSON that Risorius itself writes; None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -273,7 +273,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
 
 
 def _weights(frame: Mapping[str, Any]) -> dict[str, Any]:
-    """name -> value of each number in a frame."""
+    """Curve -> value of each number in a frame, except times and frame numbers."""
     at = next((k for k in WEIGHT_KEYS if isinstance(frame.get(k), dict)), None)
     table = frame[at] if at else frame
     return {
@@ -295,7 +295,12 @@ def _frame_column(
 
 
 def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:
-    """The key of a time, or of a list of times; a frame number only if there is no time."""
+    """The key of a time, or of a list of times; a frame number only if there is no time.
+
+    Args:
+        table: table of the JSON.
+        of_lists: whether to find a list of times instead of a single time.
+    """
     found = [
         (name.unit == FRAMES, key)
         for key, value in table.items()
@@ -315,7 +320,7 @@ def curve_table(reader: Reader, document: object) -> Take | None:
         document: parsed JSON; the keys other than "Name" are seconds.
 
     Raises:
-        AnimationFileError: a value that is not a finite number.
+        AnimationFileError: a value that is not a finite number, or times that do not ascend.
     """
     if not _is_tables(document) or not isinstance(document, list):
         return None
@@ -342,7 +347,7 @@ def keyed_curves(reader: Reader, document: object) -> Take | None:
         document: parsed JSON; times are seconds.
 
     Raises:
-        AnimationFileError: a keyframe without a time or a value.
+        AnimationFileError: a keyframe without a time or a value, or times that do not ascend.
     """
     found: dict[str, Keys] = {}
     is_cubic = False
@@ -396,7 +401,9 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 
 
 def lists_by_name(reader: Reader, document: object) -> Take | None:
-    """Reads {name: [values], ...}, which may be under "curves", with a rate or a list of times.
+    """Reads {name: [values], ...} with a rate or a list of times.
+
+    The table may be nested under a key of WEIGHT_KEYS, such as "curves".
 
     Returns None if the document has another layout.
 

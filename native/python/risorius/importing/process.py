@@ -33,10 +33,10 @@ def resample(clip: Clip, rate: float) -> Clip:
 
     Args:
         clip: any clip.
-        rate: frames per second of the result, above 0.
+        rate: frames per second of the result, above 0 and below 1e6.
 
     Raises:
-        ValueError: a rate that is not above 0.
+        ValueError: a rate out of range.
     """
     if not 0.0 < rate < 1e6:
         raise ArgumentError(f"a rate above 0 frames per second was expected, found {rate}")
@@ -97,10 +97,10 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
     """Makes a face's neutral values 0: subtracts them, and rescales the rest so that 1 stays 1.
 
     A control with the neutral value n becomes (value - n) / (1 - n), clamped to 0 unless the
-    control was negative in the capture. From angles of head and eyes, n is only subtracted. Some
-    controls are a share of another control, such as the share of the jaw's opening that the lips
-    close. They are calibrated as share times the other control, because a neutral face with shut
-    lips may have any share.
+    control was negative in the capture; the divisor is at least LEAST_RANGE (0.05). From angles of
+    head and eyes, n is only subtracted. Some controls are a share of another control, such as the
+    share of the jaw's opening that the lips close. Such controls are calibrated as share times the
+    other control, because a neutral face with shut lips may have any share.
 
     Args:
         clip: a capture that contains a neutral face.
@@ -139,7 +139,8 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     frames.
 
     Args:
-        clip: any clip; it is returned unchanged if it has fewer frames than the window.
+        clip: any clip; it is returned unchanged if it has fewer frames than the window, or if the
+            window has at most order + 1 frames.
         window: duration of each fit in seconds, above 0.
         order: degree of the polynomial, 0 or more.
 
@@ -195,7 +196,7 @@ def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
     Args:
         clip: any clip.
         cutoff: cutoff frequency of `OneEuro` at speed 0, in Hz; lower is smoother.
-        beta: increase of the cutoff with speed, see `OneEuro`.
+        beta: increase of the cutoff with speed, Hz per (unit per second).
     """
     running = OneEuro(cutoff, beta)
     rows = [running(t, v) for t, v in zip(clip.frame_times(), clip.curves.T, strict=True)]
@@ -206,8 +207,9 @@ def fill_gaps(clip: Clip, longest: float | None = None) -> Clip:
     """Resamples at the clip's rate, so that missing frames are interpolated linearly.
 
     Args:
+        clip: any clip.
         longest: seconds; in a longer gap the last value is held until one frame before the gap's
-            end.
+            end. None: every gap is interpolated.
 
     Raises:
         BudgetError: a gap with too many frames.

@@ -20,7 +20,8 @@ _USUAL = (100.0, 255.0)  # values of a full movement that files use besides 1
 
 
 def check_options(full: float | None, angles: str | None) -> None:
-    """Checks options. Raises: ArgumentError: full is not above 0, or angles is not a known unit."""
+    """Checks options. Raises: ArgumentError: full is not above 0 and below 1e9, or angles is not a
+    known unit."""
     if full is not None and not 0.0 < full < 1e9:
         raise ArgumentError(f"full_value: a number above 0 was expected, found {full}")
     if angles is not None and angles not in ANGLE_UNITS:
@@ -57,8 +58,10 @@ def refuse_other_scales(clip: Clip, name: str, full: float | None, angles: str |
     Args:
         clip: curves of controls and ANGLES.
         name: the file's name in errors.
-        full: as in `rescaled`; None: the option was not given, so controls are checked.
-        angles: as in `rescaled`; None: the option was not given, so angles are checked.
+        full: the file's value of a full movement, if the user gave it; None: not given, so controls
+            are checked.
+        angles: the unit of the file's angles, if the user gave it; None: not given, so angles are
+            checked.
 
     Raises:
         AnimationFileError: a control above 4, or an angle above 2 radians.

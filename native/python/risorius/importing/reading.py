@@ -72,9 +72,10 @@ class Imported:
     """The curves of a file before a mapping is applied.
 
     Attributes:
-        clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
-            the start of the sound.
-        kind: one of KINDS.
+        clip: curves with the file's own names and times. Timecodes and dates are counted from the
+            first frame, visemes from the start of the sound.
+        kind: one of KINDS; "curves" for curves that are not from a file, "rzc" or "clip" for a
+            clip file of Risorius.
         mapping: name of the built-in mapping for this kind of file, else of the mapping that knows
             the most curves; "" if none knows any.
         source: the file's name.
@@ -170,6 +171,11 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
     """Keeps the requested angles of head and eyes.
 
     Head angles that are all 0 are dropped, because their curves would only keep the head still.
+
+    Args:
+        done: the mapped clip.
+        rotations: angles to keep: "head" (head and neck), "all" (the eyes' angles too) or "none".
+        report: receives the dropped curves and a note; changed.
     """
     clip = done.clip
     drop = set()
@@ -191,7 +197,15 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
 
 
 def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
-    """Converts GUI curves to raw controls, frame by frame, with the rig's table."""
+    """Converts GUI curves to raw controls, frame by frame, with the rig's table.
+
+    Raw controls that are 0 in every frame get no curve.
+
+    Args:
+        clip: curves of GUI controls and angles; the angles are kept.
+        rig: rig with the table from GUI controls to raw controls.
+        report: receives a note and the controls that the rig lacks; changed.
+    """
     index = {name: i for i, name in enumerate(rig.gui_control_names)}
     gui = np.zeros((clip.frame_count, len(index)), np.float32)
     angles = [name for name in clip.names if name in ANGLES]
@@ -230,13 +244,16 @@ def read(
 
     Args:
         path: path of the file.
-        kind: one of KINDS, or None: inferred from the content, else from the suffix.
+        kind: one of KINDS, or None: inferred from the content. GLB and binary FBX are always
+            recognised by their content.
         rate: frames per second, for tables with frame numbers or without times.
         timecode_rate: frames per second of timecodes, if it cannot be inferred; 29.97 means
             30000/1001, and so on.
-        time_unit: one of importing.TIME_UNITS, for tables and JSON without a unit; "rows" ignores
-            the times, and each row is a frame at `rate`. None: from the file.
-        take: name or number of an animation, for files with several; None: the first with curves.
+        time_unit: unit of the times in tables and JSON, one of importing.TIME_UNITS, used instead
+            of a unit in the file; "rows" ignores the times, and each row is a frame at `rate`.
+            None: from the file.
+        take: name of an animation, or its number from 0, for glTF and FBX with several; None: the
+            first with curves.
 
     Raises:
         AnimationFileError: the file cannot be read or used; the sentence names file and place.
@@ -258,7 +275,7 @@ def read(
         found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
-    # for example, a number in the file causes an overflow
+    # This happens, for example, if a number in the file causes an overflow.
     except (ValueError, ArithmeticError) as error:
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
@@ -347,8 +364,10 @@ def import_file(
     """Reads a file and maps it to a clip of raw controls; also reports the use of its curves.
 
     Args:
-        path, kind, rate, timecode_rate, time_unit, take: see `read`.
-        rig_names, mapping, rig, rotations, full_value, angles: see `Imported.apply`.
+        path: path of the file.
+        kind, rate, timecode_rate, time_unit, take: options for reading the file, as in `read`.
+        rig_names, mapping, rig, rotations, full_value, angles: options for the conversion to raw
+            controls, as in `Imported.apply`.
 
     Raises:
         ValueError: an error of `read` or `Imported.apply`.
@@ -381,7 +400,12 @@ def import_curves(
         curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
             values), linear between keyframes.
         source: name of the curves in the report.
-        rig_names, mapping, rig, rotations: see `Imported.apply`.
+        rig_names: raw controls of the rig; other controls are dropped and reported. None: all are
+            kept.
+        mapping: a Mapping, name of a built-in mapping, or path of a TOML file; None: the built-in
+            mapping that knows the most curves.
+        rig: needed for a mapping of GUI controls.
+        rotations: angles to keep: "head", "all" (eyes too) or "none".
 
     Raises:
         ValueError: no curves, times that do not ascend, values that are not finite; errors of

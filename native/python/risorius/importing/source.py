@@ -109,8 +109,13 @@ def decode(data: bytes, name: str) -> str:
 
 
 def frame_rate(times: Doubles) -> float:
-    """Frames per second of frame times: a usual rate if one is within 1 %, else the measured one;
-    USUAL_RATE for keyframes that are far apart."""
+    """Frames per second of frame times: a usual rate if one is within 1 %, else the measured one.
+
+    USUAL_RATE (60) for fewer than two frames, and for keyframes that are far apart.
+
+    Args:
+        times: float64[frames], seconds, ascending.
+    """
     if times.size < 2:
         return USUAL_RATE
     step = float(np.median(np.diff(times)))

@@ -87,7 +87,10 @@ class Table:
 
     @cached_property
     def has_points(self) -> bool:
-        """Whether numbers have decimal points; if so, a comma in a cell is not a decimal comma."""
+        """Whether numbers have decimal points.
+
+        If so, a comma in a cell of a comma-separated table is not a decimal comma.
+        """
         return any(re.fullmatch(r"\s*[-+]?\d*\.\d+\s*", c) for row in self.rows for c in row)
 
     @cached_property
@@ -127,10 +130,11 @@ def sniff(line: str) -> str:
 def read_table(text: str, name: str) -> Table:
     """Parses a table with a header.
 
-    Comments are skipped. A line "sep=;" sets the delimiter, as in files of Excel.
+    Comments are skipped. A line "sep=;" sets the delimiter, as in files of Excel. A last row that
+    is too short is dropped with a note.
 
     Args:
-        text: content of the file, with commas, semicolons or tabs between cells.
+        text: content of the file, with commas, tabs, semicolons or | between cells.
         name: the file's name in errors.
 
     Raises:
@@ -142,7 +146,7 @@ def read_table(text: str, name: str) -> Table:
         raise AnimationFileError(name, "text was expected, found a zero byte", line=line)
     content, delimiter, comment = _without_comments(re.split(r"\r\n|\n|\r", text))
     delimiter = delimiter or sniff(next((line for line in content if line.strip()), ""))
-    # strict, because an unclosed quote would swallow the rest of the file
+    # The reader is strict, because an unclosed quote would swallow the rest of the file.
     reader = csv.reader(content, delimiter=delimiter, strict=True)
     rows: list[list[str]] = []
     lines: list[int] = []
@@ -239,6 +243,11 @@ def _is_missing(cell: str) -> bool:
 def _with_times(table: Table, at: int, asked: Asked) -> Table:
     """Drops rows without a time, unless the times come from the row numbers.
 
+    Args:
+        table: any table.
+        at: index of the column of times.
+        asked: the caller's options on time.
+
     Raises:
         AnimationFileError: more than MOST_LOST of the rows have no time.
     """
@@ -267,7 +276,9 @@ def is_live_link_face(header: Sequence[str]) -> bool:
 
 
 def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
-    """Reads a take of Live Link Face; times come from the timecode, not from the row number.
+    """Reads a take of Live Link Face.
+
+    Times come from the timecode, or from the row number if the caller's options say so.
 
     Args:
         table: timecode and number of shapes, then 51 to 61 curves in any order.
@@ -297,7 +308,16 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
     """Seconds of the timecodes in a column.
 
-    If the option `counts_rows` is set, the times come from the row numbers instead.
+    If the option `counts_rows` is set, the times come from the row numbers at the given rate.
+
+    Args:
+        table: any table.
+        column: index of the column.
+        asked: the caller's options on time.
+        notes: receives a sentence on the frames per second that the timecodes count.
+
+    Raises:
+        AnimationFileError: an invalid timecode, or no recognisable number of frames per second.
     """
     if asked.counts_rows:
         return row_times(len(table.rows), asked, table.name)
@@ -343,7 +363,12 @@ def _note_count(table: Table, found: int, notes: list[str]) -> None:
 
 
 def _note_dropped(times: Doubles, notes: list[str]) -> None:
-    """Adds a note on gaps in the times: a phone under load does not record every frame."""
+    """Adds a note on gaps in the times: a phone under load does not record every frame.
+
+    Args:
+        times: float64[frames], seconds, ascending.
+        notes: receives the note.
+    """
     if times.size < 3:
         return
     steps = np.diff(times)
@@ -413,7 +438,13 @@ def _plain_times(table: Table, at: int | None, asked: Asked, notes: list[str]) -
 
 
 def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
-    """Whether a column is a curve, and not a row number, a count, a second time, or text."""
+    """Whether a column is a curve, and not a row number, a count, a second time, or text.
+
+    Args:
+        table: any table.
+        column: index of the column.
+        notes: receives a sentence if an empty column or a column of text is left out.
+    """
     header = plain(table.header[column])
     if header in COUNTS or time_name(table.header[column]) is not None:
         return False
@@ -468,7 +499,12 @@ def _by_curve(table: Table, at: int) -> tuple[Table, int]:
 
 
 def _shapes(table: Table, at: int | None) -> int | None:
-    """Index of the column that contains only mouth shapes of Rhubarb; None if not exactly one."""
+    """Index of the column that contains only mouth shapes of Rhubarb; None if not exactly one.
+
+    Args:
+        table: any table.
+        at: index of the column of times, or None.
+    """
     found = [
         i
         for i in range(len(table.header))
@@ -478,7 +514,14 @@ def _shapes(table: Table, at: int | None) -> int | None:
 
 
 def _curves(table: Table, columns: Sequence[int], times: Doubles, notes: list[str]) -> Doubles:
-    """float64[columns, rows]; missing values are interpolated from other rows."""
+    """float64[columns, rows]; missing values are interpolated from other rows.
+
+    Args:
+        table: any table.
+        columns: indices of the columns with curves.
+        times: float64[rows], seconds.
+        notes: receives sentences about interpolated values.
+    """
     holes: list[tuple[str, int]] = []
     curves = np.array([_column(table, column, times, holes) for column in columns])
     if len(holes) > _HOLES_BY_NAME:

@@ -21,8 +21,8 @@ from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
 
-# Frames per second of the curves. It is fine enough, because files give the times of mouth shapes
-# to a hundredth of a second or to a frame.
+# Frames per second of the curves. More frames are not needed, because files give the times of mouth
+# shapes to a hundredth of a second or to a frame.
 RATE = 60.0
 # Seconds of the transition from one mouth shape to the next.
 BLEND = 0.12
@@ -55,12 +55,12 @@ class Cue(NamedTuple):
 def flowing_curves(
     cues: Sequence[Cue], times: Doubles, blend: float = BLEND
 ) -> tuple[list[str], Doubles]:
-    """float64[shapes, frames]: the weight of each shape; weights add up to 1 in every frame.
+    """The shapes, and the weight of each shape in each frame; weights add up to 1 in every frame.
 
     Two neighbouring cues cross-fade along half a cosine that is `blend` seconds long and centred on
-    their border. It is shorter if the cues demand it: it may reach to the middle of a dominant cue,
-    and to the far end of a weak one. A dominant cue therefore has weight 1 in its middle, and a
-    short weak one between two others never reaches weight 1.
+    their border. The cross-fade is shorter if a cue is short: it reaches at most to the middle of a
+    dominant cue, and at most to the far end of a weak one. A dominant cue therefore has weight 1 in
+    its middle, and a short weak one between two others never reaches weight 1.
 
     Args:
         cues: in order of time; each ends where the next starts.
@@ -97,9 +97,16 @@ def _take(
 ) -> Take:
     """Makes a take from cues: curves at RATE, and the cues themselves as events.
 
+    Args:
+        cues: mouth shapes in order of time.
+        kind: one of `importing.KINDS`.
+        name: the file's name in errors.
+        notes: sentences for the user.
+        events: further events of the clip.
+
     Raises:
-        AnimationFileError: no cue has a length. BudgetError: too many shapes for a track of this
-            length.
+        AnimationFileError: no cue has a length, or a cue ends after LONGEST. BudgetError: too many
+            shapes for a track of this length.
     """
     cues = [cue for cue in cues if cue.end > cue.start]
     if not cues:
@@ -121,7 +128,13 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first."""
+    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first.
+
+    Args:
+        starts: (start in seconds, shape) of each cue, ascending.
+        end: end of the last cue in seconds.
+        rest: shape before the first start.
+    """
     out = [Cue(0.0, starts[0][0], rest)] if starts and starts[0][0] > 0.0 else []
     ends = [start for start, _ in starts[1:]] + [end]
     out += [Cue(start, stop, shape) for (start, shape), stop in zip(starts, ends, strict=True)]
@@ -129,7 +142,8 @@ def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> 
 
 
 def is_rhubarb_tsv(text: str) -> bool:
-    """Whether at least half of the lines consist of a time and a Rhubarb shape."""
+    """Whether at least half of the lines consist of a time and a Rhubarb shape, and the first line
+    begins with a digit."""
     lines = [line for line in re.split(r"\r\n|\n|\r", text) if line.strip()]
     hits = sum(_TSV.fullmatch(line) is not None for line in lines)
     return bool(lines) and lines[0].strip()[:1].isdigit() and 2 * hits >= len(lines)
@@ -145,7 +159,7 @@ def read_rhubarb_tsv(text: str, name: str) -> Take:
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: an invalid line, times that do not ascend.
+        AnimationFileError: an invalid line, fewer than two lines, times that do not ascend.
     """
     starts: list[tuple[float, str]] = []
     for line, row in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
@@ -195,7 +209,12 @@ def _rhubarb_starts(starts: list[tuple[float, str]], name: str) -> Take:
 def _check_order(starts: Sequence[tuple[float, str]], name: str, line: int) -> None:
     if starts[-1][0] < 0.0 or (len(starts) > 1 and starts[-1][0] < starts[-2][0]):
         raise AnimationFileError(
-            name, f"times that ascend from 0 were expected, found {starts[-1][0]:g}", line=line
+            name,
+            (
+                f"times that ascend from 0 were expected, found {starts[-1][0]:g}: no "
+                "time below 0 s or before the previous time"
+            ),
+            line=line,
         )
 
 
@@ -285,7 +304,11 @@ def _rhubarb_cues(rows: Sequence[tuple[str, str, str]], name: str) -> Take:
         before = cues[-1].end if cues else 0.0
         if not before - 0.005 <= cue.start <= cue.end < np.inf:
             raise AnimationFileError(
-                name, f"{place}: times that ascend were expected, found {start} to {end}"
+                name,
+                (
+                    f"{place}: times that ascend from {before:g} s were expected, found "
+                    f"{start} to {end}"
+                ),
             )
         if cue.start > before + 0.005:
             cues.append(Cue(before, cue.start, "X"))
@@ -302,7 +325,8 @@ def read_dat(text: str, name: str, rate: float | None = None) -> Take:
         rate: frames per second; None: from an FPS line, else DAT_RATE with a note.
 
     Raises:
-        AnimationFileError: an invalid line, frames that do not ascend.
+        AnimationFileError: an invalid line, a rate that is not above 0, fewer than two shapes, or
+            frames that do not ascend.
     """
     lines = re.split(r"\r\n|\n|\r", text)
     notes: list[str] = []
@@ -369,7 +393,10 @@ class Lines:
 
 
 class Word(NamedTuple):
-    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame."""
+    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame.
+
+    `phonemes` has (first frame, mouth shape) of each phoneme.
+    """
 
     text: str
     start: int
@@ -432,7 +459,7 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: tables in another form.
+        AnimationFileError: tables in another form, no phonemes, or frames that do not ascend.
     """
     try:
         voices = [
@@ -456,7 +483,13 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
 
 
 def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
-    """Makes a take from the first voice with phonemes; between words the shape is "rest"."""
+    """Makes a take from the first voice with phonemes; between words the shape is "rest".
+
+    Args:
+        voices: (name, words) of each voice.
+        rate: frames per second.
+        name: the file's name in errors.
+    """
     if not 0.0 < rate < 1e4:
         raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
     speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]
@@ -472,7 +505,13 @@ def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: st
         starts.append((word.end + 1, "rest"))
     times = [frame for frame, _ in starts]
     if any(b < a for a, b in pairwise(times)) or starts[0][0] < 0:
-        raise AnimationFileError(name, f"voice {voice!r}: frames that ascend were expected")
+        raise AnimationFileError(
+            name,
+            (
+                f"voice {voice!r}: frames of 0 or more, none before the previous frame, were "
+                "expected"
+            ),
+        )
     cues = _from_starts(
         [(frame / rate, shape) for frame, shape in starts], (times[-1] + 1) / rate, "rest"
     )

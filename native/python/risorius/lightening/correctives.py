@@ -16,11 +16,12 @@ from ..base.words import counted
 from .poses import Pose, motions_at
 
 _AT_ONCE = 1 << 15  # limits the number of joints that are posed together
-_LOOKED_AT = 6000  # largest number of vertices that is needed to rank correctives
+_LOOKED_AT = 6000  # vertices that suffice to rank correctives; fewer than twice as many are used
 
 
 def needed_correctives(dna: Dna) -> set[int]:
-    """Rows of correctives, from 0, that networks, solvers' poses, twists or animated maps read."""
+    """Rows of correctives, from 0, that must stay, because networks, RBF solvers, their poses,
+    twists, swings or animated maps read or write them."""
     raw = len(dna.raw_control_names)
     read: list[object] = [dna.animated_maps.conditionals.input_indices]
     read += [n.input_indices for n in dna.machine_learned_behavior.neural_networks]
@@ -46,7 +47,8 @@ def contributions(dna: Dna, rig: Rig, poses: Sequence[Pose]) -> Doubles:
     Args:
         dna: the face.
         rig: compiled from it.
-        poses: from poses_of; a corrective without a pose gets 0.
+        poses: poses in which all controls of a corrective are at 1; a corrective without a pose
+            gets 0, and poses of single raw controls are ignored.
     """
     out = np.zeros(dna.psd_count)
     mine = [pose for pose in poses if pose.input >= len(dna.raw_control_names)]
@@ -76,7 +78,8 @@ def contributions(dna: Dna, rig: Rig, poses: Sequence[Pose]) -> Doubles:
 
 
 def middle_of(dna: Dna) -> Doubles:
-    """float64[3]: the centre of the bounding box of all meshes."""
+    """float64[3]: the centre of the bounding box of all meshes, in the file's unit; 0 without
+    vertices."""
     points = [np.asarray(mesh.positions, np.float64) for mesh in dna.meshes]
     whole = np.concatenate([*points, np.zeros((0, 3))])
     return (whole.min(axis=0) + whole.max(axis=0)) / 2 if len(whole) else np.zeros(3)
@@ -93,12 +96,13 @@ class _Spread:
         self.shapes = {column: shape[::step] for column, shape in shapes.items()}
 
     def squares(self, motions: Doubles, inputs: Doubles, values: Doubles) -> Doubles:
-        """float64[n]: sum of squared vertex displacements in each of n poses.
+        """float64[n]: sum of squared vertex displacements in each of n poses, estimated from every
+        `step`th vertex.
 
         Args:
-            motions: motions of the joints in each pose, minus the identity.
-            inputs: input whose blend shape each pose adds.
-            values: value of this input in each pose.
+            motions: float64[n, J, 3, 4], motions of the joints in each pose, minus the identity.
+            inputs: int[n], control whose blend shape each pose adds.
+            values: float64[n], value of this control in each pose.
         """
         out = np.zeros(len(motions))
         for at, motion in enumerate(motions):
@@ -118,7 +122,7 @@ def least_correctives(dna: Dna, leaving: int, contribution: Doubles) -> list[int
     Args:
         dna: the face.
         leaving: number of correctives to remove.
-        contribution: float64[correctives], see `contributions`.
+        contribution: float64[correctives], size of the displacement that each corrective adds.
 
     Raises:
         ArgumentError: the number can only be reached by removing correctives that networks,

@@ -36,7 +36,7 @@ from .weights import Refit
 Progress = Callable[[float], bool | None]
 
 _ROUNDS = 4  # largest number of rounds of choosing joints and refitting weights
-_BETTER = 0.97  # a further round follows if the error is below this fraction of the last one
+_BETTER = 0.97  # a further round follows if the error is below this fraction of the smallest one
 _FIGHT = 1.0  # exponent by which the importance of a pose grows with its error
 # Memory limit of intermediate tables in bytes: a constant, plus a factor times the face's size.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 29, 128
@@ -137,7 +137,7 @@ def lighten(
         dna: a face with meshes; not changed.
         joints: number of joints to keep; None: all that the kept LODs need.
         correctives: number of correctives to keep; None: all.
-        lods: numbers of the LODs to keep, 0 is the finest; None: all.
+        lods: numbers of the LODs to keep, 0 is the finest, in any order; None: all.
         keep: names of further joints that must stay.
         shapes_mm: blend shapes correct vertices with a larger error in mm; None: no blend shapes.
         measured: whether to report the errors of all expressions.
@@ -195,7 +195,7 @@ def _levels(dna: Dna, lods: Sequence[int] | None) -> list[int]:
         if not 0 <= lod < count:
             raise ArgumentError(f"lods: 0 to {count - 1} were expected, found {lod}")
     if not lods:
-        raise ArgumentError("lods: a level at least was expected")
+        raise ArgumentError("lods: at least one level of detail was expected, found none")
     return sorted(set(lods))
 
 
@@ -238,8 +238,13 @@ def _check_size(dna: Dna) -> None:
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Told:
-    """A function that reports progress from `begin` to `end`. It raises DnaError if the caller
-    stops the work."""
+    """A function that reports progress from `begin` to `end`, and raises DnaError if the caller
+    stops the work.
+
+    Args:
+        progress: called with the fraction of the whole work done; returning False stops the work.
+        begin, end: fractions of the whole work at the beginning and at the end of this part.
+    """
 
     def told(share: float) -> None:
         if progress is not None and progress(begin + share * (end - begin)) is False:
@@ -249,14 +254,21 @@ def _part(progress: Progress | None, begin: float, end: float) -> Told:
 
 
 def _fewer_correctives(work: _Work, rig: Rig, correctives: int) -> list[int]:
-    """Chooses the correctives to remove: their rows, from 0."""
+    """Chooses the correctives to remove: their rows, from 0.
+
+    Args:
+        work: the source face and its poses.
+        rig: compiled from the source face.
+        correctives: number of correctives to keep.
+    """
     contribution = contributions(work.dna, rig, work.poses)
     work.told(1.0)
     return least_correctives(work.dna, work.dna.psd_count - correctives, contribution)
 
 
 def _without(dna: Dna, leaving: Sequence[int]) -> Dna:
-    """The face without the correctives in `leaving`."""
+    """The face without the correctives in `leaving`, and without joint groups and columns of zeros
+    that remain."""
     if not leaving:
         return dna
     stays = [row not in set(leaving) for row in range(dna.psd_count)]
@@ -290,7 +302,14 @@ def _fewer_joints(work: _Work, dna: Dna, joints: int, keep: Sequence[str]) -> tu
     """The face with `joints` joints, and the indices of the removed joints.
 
     Poses with large errors get more importance in the next round. The result is the round whose
-    largest error at LOD 0 is smallest; rounds end when that error stops falling.
+    largest error at LOD 0 is smallest; rounds end when that error falls by less than 3 %, or after
+    four rounds.
+
+    Args:
+        work: the source face and its poses.
+        dna: the face after the removal of correctives.
+        joints: number of joints to keep.
+        keep: names of further joints that must stay.
     """
     thinning = _Thinning(dna, work.middle, needed_joints(dna, keep))
     counts = np.array([1.0 / np.sqrt(pose.controls) for pose in thinning.poses])
@@ -360,7 +379,14 @@ class _Thinning:
     def made(
         self, gone: Sequence[int], leaving: Leaving, counts: Doubles, levels: Sequence[int]
     ) -> Dna:
-        """The face without the joints `gone`, with refitted weights at the LODs `levels`."""
+        """The face without the joints `gone`, with refitted weights at the LODs `levels`.
+
+        Args:
+            gone: indices of the removed joints.
+            leaving: the vertex weights after other joints took over vertices of removed joints.
+            counts: float64[poses], importance of each pose.
+            levels: LODs whose meshes get refitted weights; other meshes are not refitted.
+        """
         stays = np.ones(len(self.parents), bool)
         stays[list(gone)] = False
         out, meshes = copy.copy(self.dna), list(self.dna.meshes)
@@ -386,7 +412,14 @@ class _Thinning:
 
 
 def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
-    """float64[V, J]: weights of one mesh after other joints took over removed joints' vertices."""
+    """float64[V, J]: weights of one mesh after other joints took over removed joints' vertices.
+
+    Args:
+        leaving: vertex weights of the remaining joints, of all meshes.
+        begin, end: first vertex of the mesh, and the vertex after its last one, counted over all
+            meshes.
+        joints: number of joints J.
+    """
     out = np.zeros((end - begin, joints))
     for joint, (vertices, weights) in enumerate(leaving.held):
         first, last = np.searchsorted(vertices, (begin, end))
@@ -402,6 +435,14 @@ def _products(
     For each joint with children that no pose moves, a shift of the joint and its descendants by
     CARRIED_MM is added as a pose, because otherwise all joints that no pose moves would seem to be
     interchangeable.
+
+    Args:
+        dna: the face.
+        rig: compiled from it.
+        lod: the LOD that is evaluated.
+        poses: the poses.
+        counts: float64[poses], importance of each pose.
+        middle: float64[3], the origin of the points.
     """
     count = len(dna.joint_names)
     out = np.zeros((4 * count, 4 * count))
@@ -424,7 +465,13 @@ def _products(
 
 def _mates(source: Dna, leaving: Sequence[int], poses: Sequence[Pose]) -> list[tuple[Pose, Pose]]:
     """Pairs of a source pose and the same pose of the face without the correctives `leaving`. The
-    input of the second pose is renumbered, -1 for a removed corrective."""
+    input of the second pose is renumbered, -1 for a removed corrective.
+
+    Args:
+        source: the source face.
+        leaving: rows of the removed correctives, from 0.
+        poses: poses of the source face.
+    """
     raw, rows = len(source.raw_control_names), np.ones(source.psd_count, bool)
     rows[list(leaving)] = False
     place: Ints = np.where(rows, np.cumsum(rows) - 1, -1)
@@ -440,7 +487,14 @@ def _mates(source: Dna, leaving: Sequence[int], poses: Sequence[Pose]) -> list[t
 def _compare(
     source: Dna, made: Dna, mates: Sequence[tuple[Pose, Pose]], told: Told
 ) -> list[ExpressionError]:
-    """The errors of all poses, the largest first."""
+    """The errors of all poses, the largest first.
+
+    Args:
+        source: the source face.
+        made: the lighter face.
+        mates: pairs of a source pose and the same pose of the lighter face.
+        told: called with the fraction of the work done, 0 to 1.
+    """
     poses = [pose for pose, _ in mates]
     largest, rms = errors(source, made, (Rig(source), Rig(made)), poses, told)
     mm = MM.get(source.translation_unit, 10.0)

@@ -26,7 +26,8 @@ class Pose:
     Attributes:
         name: name of the control, or of a corrective's controls joined by +.
         raw: float32[R], values of all raw controls.
-        input: index in the control vector of the raw control or corrective that the pose tests.
+        input: index in the control vector of the raw control or corrective that the pose tests; -1
+            if this corrective was removed.
         controls: number of controls in the pose; a joint's rotation counts as one.
     """
 
@@ -40,7 +41,8 @@ def poses_of(dna: Dna, rig: Rig) -> list[Pose]:
     """A pose per raw control at 1, then a pose per corrective with all of its controls at 1.
 
     Controls that are components of a joint's rotation get no pose, because their values are not
-    weights. For a corrective that a pose solver drives, the pose has the solver's rotations.
+    weights. For a corrective that a pose solver drives, the pose has the solver's rotations. A
+    corrective that reads an output of a network gets no pose.
 
     Args:
         dna: the face.
@@ -84,7 +86,11 @@ class Factors:
         self._solved = _solver_poses(dna)
 
     def of(self, control: int) -> dict[int, float]:
-        """Values of the raw controls at which `control` is 1; empty if there are none."""
+        """Index of a raw control -> its value, so that `control` is 1; empty if there are none.
+
+        Args:
+            control: index in the control vector of a raw control, corrective or solver's pose.
+        """
         values: dict[int, float] = {}
         waiting, seen = [control], set()
         while waiting:
@@ -147,7 +153,7 @@ def motion_rows(
 ) -> Iterator[Doubles]:
     """The motions of joints in poses minus the identity, a block of poses at a time.
 
-    They are 0 in the neutral pose.
+    The results are 0 in the neutral pose.
 
     Args:
         dna: the face.

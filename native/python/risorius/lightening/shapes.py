@@ -22,8 +22,9 @@ def add_shapes(
 ) -> Dna:
     """Adds blend shapes to the lighter face for vertices with a larger error than the tolerance.
 
-    Expressions come first, then correctives of two controls, then of more; each step corrects the
-    error that is left. Only LODs that have blend shapes get new ones.
+    Expressions come first, then correctives by the number of their controls, where four or more
+    count as one step; each step corrects the error that is left. Only LODs that have blend shapes
+    get new ones.
 
     Args:
         before: the source face, with the same LODs and meshes.
@@ -49,7 +50,15 @@ def add_shapes(
 def _add_stage(
     before: Dna, after: Dna, old: Rig, poses: Sequence[tuple[Pose, Pose]], tolerance: float
 ) -> Dna:
-    """Adds blend shapes for some poses, all computed from the same lighter face."""
+    """Adds blend shapes for some poses, all computed from the same lighter face.
+
+    Args:
+        before: the source face.
+        after: the lighter face; not changed.
+        old: compiled from `before`.
+        poses: each pose of `before` with the same pose of `after`.
+        tolerance: allowed error in the file's unit.
+    """
     new = Rig(after)
     found: dict[tuple[int, int], tuple[Ints, Doubles]] = {}  # (mesh, input) -> (vertices, deltas)
     for lod in range(after.lod_count):
@@ -85,7 +94,12 @@ def _has_shapes(dna: Dna, lod: int) -> bool:
 
 
 def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -> Dna:
-    """The face with these deltas added to its blend shapes; missing channels are created."""
+    """The face with these deltas added to its blend shapes; missing channels are created.
+
+    Args:
+        dna: the face; not changed.
+        found: (mesh, control that drives the shape) -> (indices of vertices, float64[n, 3] deltas).
+    """
     out = copy.copy(dna)
     channels = dna.blend_shape_channels
     drives = {
@@ -106,8 +120,14 @@ def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -
 
 
 def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
-    """Adds a channel for each input. The new channels are the first rows, so that all LODs with
-    channels use them."""
+    """Adds a channel for each input, and returns input -> index of its channel.
+
+    The rows of the new channels come first, so that all LODs with channels use them.
+
+    Args:
+        dna: the face; changed in place.
+        inputs: indices in the control vector of the controls that drive the new channels.
+    """
     if not inputs:
         return {}
     first, raw = len(dna.blend_shape_channel_names), dna.raw_control_names
@@ -130,7 +150,12 @@ def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
 
 
 def _more(mesh: Mesh, shapes: dict[int, tuple[Ints, Doubles]]) -> Mesh:
-    """The mesh with deltas added to the targets of some channels."""
+    """The mesh with deltas added to the targets of some channels.
+
+    Args:
+        mesh: the mesh; not changed.
+        shapes: channel -> (indices of vertices, float64[n, 3] deltas).
+    """
     out, targets = copy.copy(mesh), list(mesh.blend_shape_targets)
     at = {int(target.blend_shape_channel_index): n for n, target in enumerate(targets)}
     for channel, (vertices, deltas) in sorted(shapes.items()):

@@ -14,8 +14,9 @@ _LEAST = 1e-4  # smaller weights are dropped
 def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
     """float64[n, k]: for each problem, weights w that minimise w^T G w - 2 b^T w.
 
-    They are at least 0 and sum to 1. Negative weights of a problem are removed all at once, then
-    the smallest until `most` are left, so the result is near the minimum but not always exact.
+    The weights are at least 0 and sum to 1. Weights below 1e-4 of a problem are removed all at
+    once, then the smallest until `most` are left, so the result is near the minimum but not always
+    exact.
 
     Args:
         grams: float64[n, k, k], G of each problem, symmetric.
@@ -45,7 +46,13 @@ def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
 
 
 def _solve(grams: Doubles, rights: Doubles, active: Doubles) -> Doubles:
-    """float64[n, k]: minima for weights with sum 1, which may be negative; inactive weights: 0."""
+    """float64[n, k]: minima for weights with sum 1, which may be negative; inactive weights: 0.
+
+    Args:
+        grams: float64[n, k, k], matrix of each problem.
+        rights: float64[n, k], right side of each problem.
+        active: bool[n, k], weights that are not fixed to 0.
+    """
     count, size = rights.shape
     diagonal = np.einsum("nkk->nk", grams)
     largest = diagonal.max(axis=1) + 1e-30

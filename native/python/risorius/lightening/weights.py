@@ -13,7 +13,8 @@ from ..author.geometry.skeleton import Doubles, Ints
 from .simplex import shares
 
 _MOST = 12  # largest number of joints per vertex, usual for such faces
-_TAKEN_OVER, _NEAR = 14, 6  # joints that are tried per vertex: heirs, and nearest joints
+# Joints that are tried per vertex: those with the largest weights, and the nearest ones.
+_TAKEN_OVER, _NEAR = 14, 6
 _AT_ONCE = 512  # number of vertices that are refitted together
 _EVEN = 3e-3  # strength of the pull towards the weights after the takeover, which are smooth
 
@@ -23,7 +24,8 @@ class Refit:
 
     def __init__(self, products: Doubles, places: Doubles, parents: Ints, kept: Ints) -> None:
         """Args:
-        products: float64[J, 4, J, 4] at the LOD, see joints.Leaving.
+        products: float64[J, 4, J, 4], products of the motions of two joints at the LOD, summed over
+            all poses.
         places: float64[J, 3], rest positions of the joints relative to the face's centre.
         parents: int64[J], parent of each joint.
         kept: indices of the remaining joints that the LOD lists, ascending.
@@ -59,7 +61,14 @@ class Refit:
     def _some(
         self, points: Doubles, had: Doubles, rows: Doubles, most: int
     ) -> tuple[Ints, Doubles]:
-        """The refitted joints and weights of n vertices, both [n, k]."""
+        """The refitted joints and weights of n vertices, both [n, k].
+
+        Args:
+            points: float64[n, 3], the vertices relative to the face's centre.
+            had: float64[n, J], weights in the source face.
+            rows: float64[n, J], weights after other joints took over vertices of removed joints.
+            most: largest number of joints of a vertex.
+        """
         own = np.argsort(-had, axis=1, kind="stable")[:, : int((had > 0).sum(axis=1).max())]
         held = np.take_along_axis(had, own, axis=1)
         tried = self._tried(points, rows)
@@ -89,8 +98,12 @@ class Refit:
     def _tried(self, points: Doubles, rows: Doubles) -> Ints:
         """int64[n, k]: joints that a vertex may follow, with repetitions.
 
-        They are the joints that took over the vertex, the parent of the first one, and the nearest
-        joints.
+        The joints are the ones with the largest weights in `rows`, the parent of the first of them,
+        and the nearest joints.
+
+        Args:
+            points: float64[n, 3], the vertices relative to the face's centre.
+            rows: float64[n, J], weights after other joints took over vertices of removed joints.
         """
         took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
         places = self.places[self.kept]
@@ -102,7 +115,12 @@ class Refit:
 
 
 def _with_rows(mesh: Mesh, rows: dict[int, tuple[Ints, Doubles]]) -> Mesh:
-    """The mesh with new joints and weights of some vertices."""
+    """The mesh with new joints and weights of some vertices.
+
+    Args:
+        mesh: the mesh; not changed.
+        rows: vertex -> (its joints, their weights).
+    """
     out = copy.copy(mesh)
     offsets = np.asarray(mesh.skin_offsets, np.int64)
     joints = np.split(np.asarray(mesh.skin_joint_indices, np.int64), offsets[1:-1])

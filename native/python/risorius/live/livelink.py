@@ -10,8 +10,8 @@ A packet is big-endian and has one of these versions:
            count u8, count x f32
 
 A text is a u32 length and that number of UTF-8 bytes, without a final zero. Version 6 counts frames
-from midnight. While the app sees no face, the packet ends after the subject. Values are in the
-order of NAMES; packets of 51 or 52 values have no rotations.
+from midnight. While the app sees no face, the packet ends after the subject or the time, or
+has the count 0. Values are in the order of NAMES; packets of 51 or 52 values have no rotations.
 """
 
 from __future__ import annotations
@@ -44,9 +44,12 @@ class NoFace(LiveError):  # noqa: N818  not an error of the sender
 def decode(data: bytes) -> Packet:
     """Decodes a packet.
 
+    Args:
+        data: bytes of the packet.
+
     Raises:
         NoFace: the packet has no values.
-        LiveError: not a packet of Live Link Face; the message names the expected and found value.
+        LiveError: not a packet of Live Link Face, or a value that is no blend shape or angle.
     """
     if not data:
         raise LiveError("an empty packet")
@@ -69,7 +72,10 @@ def decode(data: bytes) -> Packet:
         raise LiveError(f"{4 * count} bytes of values were expected, found {len(data) - place - 1}")
     values = np.frombuffer(data, ">f4", count, place + 1).astype(np.float32) * _SIGNS[:count]
     if not (np.abs(values) <= _LARGEST).all():  # also false for NaN
-        raise LiveError(f"a value of a face was expected, found {values[_worst(values)]}")
+        worst = values[_worst(values)]
+        raise LiveError(
+            f"a value of a face was expected, found {worst}: at most {_LARGEST:g} in size"
+        )
     return Packet(subject, device, time, NAMES[:count], values)
 
 
@@ -98,7 +104,8 @@ def _of_timestamp(data: bytes, place: int) -> tuple[float | None, int]:
 def _of_timecode(data: bytes, place: int) -> tuple[float | None, int]:
     _need(data, place, 21)
     hours, minutes, seconds, frames = struct.unpack_from(">4i", data, place)
-    # Some engines send the drop-frame byte, others do not: the length of the packet shows it.
+    # Some engines send the drop-frame byte, others do not: the length of the packet shows
+    # whether it is there.
     place += 16 if _fits(data, place + 20) or not _fits(data, place + 21) else 17
     _need(data, place, 5)
     (rate,) = struct.unpack_from(">I", data, place)

@@ -120,7 +120,8 @@ class Decoder:
             The faces that the packet completes.
 
         Raises:
-            LiveError: not OSC, or an impossible value; values of earlier messages are kept.
+            LiveError: not OSC, an impossible value (values of earlier messages are kept), or a new
+                sender for which no place is free.
         """
         found = list(messages(data))
         now = perf_counter() if now is None else now
@@ -129,8 +130,8 @@ class Decoder:
             face = _Face(sender)
             if not self._faces.add(sender, face, now, sender):
                 raise LiveError(
-                    f"{MOST} senders are heard at once: there is no room for another that is not "
-                    "named as the subject to follow"
+                    f"{MOST} senders are received at once: there is no room for another that is "
+                    "not named as the subject to follow"
                 )
         time, done = bundle_time(data), []
         for address, values in found:
@@ -165,7 +166,17 @@ class _Face:
         self.quaternion = False
 
     def take(self, address: str, values: list[Any], time: float | None) -> Packet | None:
-        """Processes a message. Returns: the face that this message completes, or None."""
+        """Processes a message.
+
+        Args:
+            address: address of the message, such as /VMC/Ext/Blend/Val.
+            values: arguments of the message.
+            time: time tag of its bundle in seconds since 1970, or None.
+
+        Returns:
+            The face that this message completes, or None. For a sender without Apply messages, that
+            is the face before the message if the message repeats one of its names.
+        """
         if address == "/VMC/Ext/Blend/Apply":
             self.applies = True
             return self.finish()
@@ -212,7 +223,9 @@ def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
         raise LiveError(f"{count} numbers were expected, found {len(values)}")
     numbers = tuple(float(v) if isinstance(v, int | float) else math.nan for v in values[:count])
     if not all(abs(v) <= _LARGEST * 10.0 for v in numbers):
-        raise LiveError(f"numbers of a face were expected, found {numbers}")
+        raise LiveError(
+            f"numbers of a face were expected, found {numbers}: at most {_LARGEST * 10.0:g} in size"
+        )
     return numbers
 
 
@@ -223,7 +236,9 @@ def _named(name: Any, value: Any) -> tuple[str, dict[str, float]]:
         return name, {}
     (number,) = _numbers([value], 1)
     if abs(number) > _LARGEST:
-        raise LiveError(f"{name}: a value of a face was expected, found {number}")
+        raise LiveError(
+            f"{name}: a value of a face was expected, found {number}: at most {_LARGEST:g} in size"
+        )
     unit = name if name.startswith("CTRL_") else unit_name(name)
     return unit, {unit: number}
 

@@ -89,7 +89,12 @@ class _Subject:
         self.arrivals: deque[float] = deque(maxlen=512)
 
     def accept(self, packet: Packet, arrival: float) -> Frame | None:
-        """The packet as the subject's next frame, or None if it came late."""
+        """The packet as the subject's next frame, or None if it came late.
+
+        Args:
+            packet: a decoded packet of this subject.
+            arrival: time of arrival in seconds of perf_counter.
+        """
         time = self._own_time(packet.time, arrival)
         if time is None:
             return None
@@ -105,6 +110,10 @@ class _Subject:
         """The time of a frame: the sender's time with jumps of its clock removed.
 
         If the packet has no sender's time, the time is the time of arrival.
+
+        Args:
+            sent: the sender's time in seconds, or None.
+            arrival: time of arrival in seconds of perf_counter.
 
         Returns:
             Seconds; None if the packet came late.
@@ -136,6 +145,10 @@ class _Subject:
 
         The gain is measured from the first frame. A tolerance for each frame would add up and make
         a recording longer than the real time.
+
+        Args:
+            time: time of the frame by the sender's clock, in seconds.
+            arrival: time of arrival in seconds of perf_counter.
         """
         passed = arrival - self._began[1]
         return time - self._began[0] - passed - _AHEAD - _DRIFT * passed
@@ -159,6 +172,14 @@ class Receiver:
         source: "livelink" or "osc".
         port: number of the port; 0 for any free port; None for the source's usual port.
         host: address to listen on: THIS_MACHINE, or EVERYWHERE for phones.
+
+    Attributes:
+        source: the source.
+        host: the address to listen on.
+        port: number of the port; after `start` the number that the system chose for 0.
+
+    Raises:
+        LiveError: an unknown source.
     """
 
     def __init__(
@@ -188,7 +209,12 @@ class Receiver:
         self.stop()
 
     def start(self) -> None:
-        """Starts to listen. Raises: LiveError: the port is in use, or a package is missing."""
+        """Starts to listen; no effect if it listens already.
+
+        Raises:
+            LiveError: the port is in use or no valid number, the address cannot be used, or
+                python-osc is missing.
+        """
         if self._thread is not None:
             return
         if self.source == "osc":
@@ -210,7 +236,8 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the subject that came first."""
+        """The latest frame of a subject; for "", of the first subject. None if the subject
+        has no frame yet."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
@@ -233,9 +260,11 @@ class Receiver:
         return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:
-        """Records a subject until `finish`; for "", the subject whose packets arrive first.
+        """Records a subject until `finish`.
 
         Args:
+            subject: name of the subject; "": the first known one, or, before any frame, the one
+                whose frame arrives first.
             limit: largest number of frames; the default is half an hour at 60 per second.
         """
         with self._lock:
@@ -252,7 +281,8 @@ class Receiver:
         return take
 
     def status(self, subject: str = "") -> Status:
-        """The statistics of the reception, with the rate and age of a subject."""
+        """The statistics of the reception, with the rate and age of a subject; for "", of the
+        first subject."""
         now = perf_counter()
         with self._lock:
             found = self._find(subject)
@@ -364,7 +394,12 @@ class Receiver:
         return subject if added else None
 
     def _free_label(self, packet: Packet, address: str) -> str:
-        """A label for a new subject: its name, with additions if another subject has that label."""
+        """A label for a new subject: its name, with additions if another subject has that label.
+
+        Args:
+            packet: the first packet of the subject.
+            address: address of the sender.
+        """
         name, taken = (
             packet.subject or packet.device or "unnamed",
             {s.label for s in self._subjects},

@@ -80,7 +80,13 @@ class Plan:
 
 
 def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
-    """{control: weight} of each name; empty for an ignored name, None for an unknown one."""
+    """{control: weight} of each name; empty for an ignored name, None for an unknown one.
+
+    Args:
+        names: names in a frame.
+        mapping: the mapping; names that it lacks may be raw controls, angles, or names of any
+            vocabulary.
+    """
     find = mapping.finder()
     rows = [found[1] if (found := find(name)) else None for name in names]
     units = sum(bool(row) for row in rows)
@@ -117,6 +123,10 @@ def _look(name: str, mapping: Mapping) -> Row:
     """{control: weight} for an eye's angle in radians.
 
     Positive angles move one look unit, such as eyeLookUpLeft, negative ones the opposite unit.
+
+    Args:
+        name: name of the angle, such as "eyeL.yaw".
+        mapping: converts ARKit units to controls.
     """
     side = "Left" if name[3] == "L" else "Right"
     if name.endswith("pitch"):
@@ -141,13 +151,15 @@ class Shaper:
     Attributes:
         mapping: the Mapping; names that it lacks may be raw controls, head angles, or names of any
             vocabulary.
-        gain: factor on all controls except shares of another control, so that shut lips stay shut.
+        gain: factor on all controls except the head's angles and shares of another control, so that
+            shut lips stay shut.
         head_gain: factor on the head's angles; a negative factor reverses them.
         gains: name in the frame -> factor, in addition to `gain`.
         smoothing: strength of the one-euro filter, 0 (none) to 1; it calms a still face and passes
             quick movements.
-        maximum: upper limit of control values.
-        neutral: values of the neutral face, by name in the frame; see `capture`.
+        maximum: upper limit of control values, except the head's angles.
+        neutral: name in the frame -> value in the neutral face, which is subtracted; `capture` sets
+            it. Empty: nothing is subtracted.
         ranges: the person's ranges, applied to controls before the gain; None: no remapping. If
             `neutral` is set, only the extremes of the ranges are used.
     """
@@ -218,7 +230,8 @@ class Shaper:
         if self.gains:
             values = values * np.array([self.gains.get(n, 1.0) for n in frame.names], np.float32)
         result = plan.matrix @ values
-        # Shares use values before `gains`, because a gain of the jaw must not part the lips.
+        # The control of which a share is taken back is read before `gains`, because a gain of the
+        # jaw must not part the lips.
         for place, whole in plan.shares:
             result[place] = share_of(result[place], plan.matrix[whole] @ plain)
         for place, change in plan.adjusted:
@@ -234,7 +247,13 @@ class Shaper:
         return Controls(plan.controls, result)
 
     def _calibrated(self, frame: Frame, is_angle: np.ndarray) -> Floats:  # type: ignore[type-arg]
-        """Values minus the neutral ones, rescaled so that a blend shape still reaches 1."""
+        """float32[names]: values minus the neutral ones; blend shapes are not below 0, and are
+        rescaled so that they still reach 1.
+
+        Args:
+            frame: the received values.
+            is_angle: bool[names], True for angles, which are not rescaled.
+        """
         if not self.neutral:
             return frame.values
         rest = np.array([self.neutral.get(n, 0.0) for n in frame.names], np.float32)

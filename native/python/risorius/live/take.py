@@ -15,6 +15,7 @@ class Take:
 
     Attributes:
         subject: the recorded subject; "" until the first frame determines it.
+        limit: largest number of frames.
         full: number of frames that arrived after the limit was reached, and were dropped.
     """
 
@@ -28,7 +29,13 @@ class Take:
         return len(self._frames)
 
     def add(self, frame: Frame) -> None:
-        """Appends a frame of the subject; a frame that is not later replaces the last one."""
+        """Appends a frame of the subject; frames of other subjects are ignored.
+
+        A frame that is not later than the last one replaces it, at the time of the last one.
+
+        Args:
+            frame: the next frame in order of arrival.
+        """
         self.subject = self.subject or frame.subject
         if frame.subject != self.subject:
             return
@@ -47,7 +54,7 @@ class Take:
                 later but not removed.
 
         Returns:
-            A Clip with a time per frame. Before a control first arrives its curve is 0.
+            A Clip with a time per frame. A curve is 0 in frames that do not give its control.
         """
         shaper = (shaper or Shaper()).without_smoothing()
         rows = [shaper.apply(frame) for frame in self._frames]
@@ -66,7 +73,7 @@ class Take:
         return Clip(names, curves, _rate(times), times=times, metadata=metadata)
 
     def unmapped(self, shaper: Shaper) -> list[str]:
-        """Names in the take's frames that a shaper's mapping does not know."""
+        """Names in the take's frames for which a shaper has no control."""
         kinds = dict.fromkeys(frame.names for frame in self._frames)
         plans = (Plan(names, shaper.mapping) for names in kinds)
         return sorted({name for plan in plans for name in plan.unmapped})

@@ -180,9 +180,9 @@ def turned_groups(dna: Dna) -> list[int]:
 
 
 def _turned_lists(dna: Dna) -> list[tuple[bytes, ...]]:
-    """(LODs, inputs, outputs) of the groups from turned_groups, as bytes. They must be equal,
-    because quaternions are multiplied in the order of the columns, so that a mean of columns in
-    different orders is meaningless."""
+    """(LODs, inputs, outputs) of each joint group that moves a joint with quaternion rotation, as
+    bytes. The lists of both faces must be equal, because quaternions are multiplied in the order of
+    the columns, so that a mean of columns in different orders is meaningless."""
     groups = dna.joint_groups
     return [
         (g.lods.tobytes(), g.input_indices.tobytes(), g.output_indices.tobytes())

@@ -22,7 +22,8 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
 
     If all parents have joint groups with equal rows and columns, the mix has these groups too.
     Otherwise joint groups that share a joint are merged into one group with all their rows and
-    columns, or into several if one would have far more coefficients.
+    columns, or into several if one would have over four times as many coefficients as they. Groups
+    that move a joint with quaternion rotation are never merged.
 
     Args:
         parents: compatible faces.
@@ -57,7 +58,12 @@ def _lists(group: JointGroup) -> tuple[bytes, ...]:
 
 
 def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
-    """The weighted mean of joint groups with equal rows and columns, one from each mixed face."""
+    """The weighted mean of joint groups with equal rows and columns, one from each mixed face.
+
+    Args:
+        groups: the joint group of each parent.
+        share: weights of the parents for each joint.
+    """
     first = groups[0]
     rows = np.asarray(first.output_indices, np.int64)
     values = sum(_weights(share, p, rows)[:, None] * g.values for p, g in enumerate(groups))
@@ -71,7 +77,13 @@ def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
 
 
 def _weights(share: Share, parent: int, rows: Ints) -> Doubles:
-    """float64[n]: weights of one parent for rows; only translations include the region's scale."""
+    """float64[n]: weights of one parent for rows; only translations include the region's scale.
+
+    Args:
+        share: weights of the parents for each joint.
+        parent: index of the parent.
+        rows: int64[n], rows of the joint matrix: 9 * joint + attribute.
+    """
     joints = rows // 9
     return np.where(rows % 9 < 3, share.scaled[joints, parent], share.weights[joints, parent])
 
@@ -106,8 +118,13 @@ def _joints(group: JointGroup) -> list[int]:
 
 
 def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup]:
-    """Merges joint groups into one, or into one for each set of rows with the same source
-    groups."""
+    """Merges joint groups into one, or into one for each set of rows with the same source groups.
+
+    Args:
+        parts: (index of a parent, one of its joint groups); the groups share joints.
+        share: weights of the parents for each joint; groups of parents with weight 0 are dropped.
+        levels: number of LODs.
+    """
     levels_of: dict[int, int] = {}  # row -> number of LODs that evaluate it
     of_row: dict[int, list[int]] = {}  # row -> indices of the source groups that have it
     used: list[_Source] = []
@@ -151,8 +168,15 @@ def _block(
     levels_of: dict[int, int],
     levels: int,
 ) -> list[JointGroup]:
-    """Merges rows into one joint group with all columns of the sources; [] if there is no
-    column."""
+    """Merges rows into one joint group with all columns of the sources; [] if there is no column.
+
+    Args:
+        rows: rows of the joint matrix.
+        sources: joint groups of the parents.
+        share: weights of the parents for each joint.
+        levels_of: row -> number of LODs that evaluate it.
+        levels: number of LODs.
+    """
     order = sorted(rows, key=lambda row: -levels_of[row])
     inputs = sorted({int(c) for source in sources for c in source.group.input_indices})
     if not order or not inputs:

@@ -95,7 +95,14 @@ def _skin(dna: Dna, listed: list[int]) -> int | None:
 
 
 def _moved(mesh: Mesh, skin: Doubles, shift: Doubles, budget: Budget) -> Doubles:
-    """float64[V, 3]: positions of hair, each moved like the nearest skin vertices."""
+    """float64[V, 3]: positions of hair, each moved like the nearest skin vertices.
+
+    Args:
+        mesh: the hair.
+        skin: float64[n, 3], vertices of the skin in the parent's face.
+        shift: float64[n, 3], displacements of these vertices from the parent's face to the mix.
+        budget: budget of the face.
+    """
     points = np.asarray(mesh.positions, np.float64)
     near = nearest(points, skin, min(_NEAR, len(skin)), budget)
     square = ((points[:, None] - skin[near]) ** 2).sum(axis=2)
@@ -105,7 +112,7 @@ def _moved(mesh: Mesh, skin: Doubles, shift: Doubles, budget: Budget) -> Doubles
 
 
 def budget_of(dna: Dna) -> Budget:
-    """The budget for mixing a face, as large as for compiling it; see native/README.md.
+    """Limits on memory and work for mixing a face, by its size; as large as for compiling it.
 
     Args:
         dna: the face.

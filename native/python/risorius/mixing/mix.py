@@ -38,18 +38,19 @@ class Mix:
     regions: Mapping[str, Mapping[int, float]] = field(default_factory=dict)
 
     def whole(self) -> Doubles:
-        """float64[P]: the parents' shares in the whole face, with sum 1. Raises: ValueError: as
-        `table`."""
+        """float64[P]: the parents' shares in the whole face, with sum 1. Raises: ValueError: an
+        invalid share, or shares that are all 0."""
         whole = np.array(self.shares, np.float64)
         if not len(whole) or not np.isfinite(whole).all() or (whole < 0).any() or not whole.sum():
-            raise ArgumentError("shares from 0 on were expected, one of them above 0")
+            raise ArgumentError("shares from 0 on were expected, at least one of them above 0")
         return np.asarray(whole / whole.sum())
 
     def table(self) -> Doubles:
         """float64[regions, P]: the parents' shares in each region; rows sum to 1.
 
         Raises:
-            ValueError: an invalid share, shares that are all 0, or above 1 in a region.
+            ValueError: an invalid share, an unknown region, shares that are all 0, or shares of a
+                region that sum to more than 1.
         """
         whole = self.whole()
         out = np.tile(whole, (len(REGIONS), 1))
@@ -76,14 +77,15 @@ def mix_faces(
     """Makes the weighted mean of faces.
 
     Args:
-        parents: compatible faces, see check_compatible; they are not changed.
+        parents: faces with equal names, topology and behavior, which check_compatible checks; they
+            are not changed.
         mix: the shares of the parents.
         name: name of the new face; None: from the parent with the largest share.
-        masks: masks of the first parent's regions; None: they are computed.
+        masks: masks of the first parent's regions; None: they are computed if they are needed.
 
     Returns:
-        The mixed face. If one parent has all shares, it equals that parent bitwise. Metadata and
-        hair come from the parent with the largest share.
+        The mixed face. If one parent has all shares, the mix equals that parent bitwise, except
+        for a given `name`. Metadata and hair come from the parent with the largest share.
 
     Raises:
         ValueError: invalid shares, or a region without vertices in the first parent.
@@ -183,7 +185,12 @@ def _spread(points: Doubles, weights: Doubles) -> float:
 
 
 def _middles(points: Doubles, masks: Doubles) -> Doubles:
-    """float64[regions, 3]: the mean of the points, weighted by each region's mask."""
+    """float64[regions, 3]: the mean of the points, weighted by each region's mask.
+
+    Args:
+        points: float64[n, 3], the points.
+        masks: float64[n, regions], weight of each point in each region.
+    """
     total = masks.sum(axis=0)[:, None]
     return np.asarray(masks.T @ points / np.maximum(total, 1e-30))
 
@@ -232,7 +239,12 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
 
 
 def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget]:
-    """Blend shape targets with all vertices that any parent moves."""
+    """Blend shape targets with all vertices that any parent moves.
+
+    Args:
+        parents: meshes with the same topology.
+        weights: float64[V, P], weights of the parents times the scale of their regions.
+    """
     own = [
         {int(t.blend_shape_channel_index): t for t in mesh.blend_shape_targets} for mesh in parents
     ]
@@ -260,7 +272,13 @@ def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget
 
 
 def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
-    """Sets the mixed skin weights; nothing changes if all parents have the same skin weights."""
+    """Sets the mixed skin weights; nothing changes if all parents have the same skin weights.
+
+    Args:
+        out: the mixed mesh; changed.
+        parents: meshes with the same topology.
+        weights: float64[V, P], weights of the parents.
+    """
     fields = ("skin_offsets", "skin_joint_indices", "skin_weights")
     if all(
         np.array_equal(getattr(parents[0], name), getattr(mesh, name))
@@ -307,7 +325,7 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
         held += np.bincount(holds, weights=weight, minlength=count)
         for region, part in enumerate(masks.meshes[m].T):
             sums[:, region] += np.bincount(holds, weights=weight * part[vertex], minlength=count)
-    # A joint without vertices takes the mask of its children.
+    # A joint without vertices takes the mask of its children; without any, it is of the skull.
     for joint in reversed(sk.parent_order(dna)):
         parent = int(dna.joint_parents[joint])
         if parent != joint and held[parent] < 1e-6 and held[joint] > 0:
@@ -320,7 +338,13 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
 
 
 def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
-    """Sets the neutral pose: joints at the mean of their world positions, with mean rotations."""
+    """Sets the neutral pose: joints at the mean of their world positions, with mean rotations.
+
+    Args:
+        out: the mix; changed.
+        parents: the mixed faces.
+        share: weights of the parents for each joint.
+    """
     weights = share.weights
     shifts = [np.asarray(p.neutral_joint_translations, np.float64) for p in parents]
     turns = [np.asarray(p.neutral_joint_rotations, np.float64) for p in parents]
@@ -330,8 +354,8 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
     places = [sk.world_matrices(p, rest)[:, :3, 3] for p in parents]
     world = share.places(places)
     local = mean_of(shifts, weights)
-    # If no region is moved and all rotations are equal, the mean of local translations gives the
-    # same positions without rounding errors.
+    # If no region is moved, all rotations are equal, and a joint has the weights of its parent, the
+    # mean of its local translations gives the same position without rounding errors.
     alike = all(np.array_equal(turns[0], t) for t in turns[1:]) and not share.shift.any()
     frames = np.tile(np.eye(4), (count, 1, 1))
     matrices = sk.rotation_matrices(Convention.of(out), rotations)
@@ -348,7 +372,13 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
 
 
 def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
-    """float64[J, 3]: mean rotations in the file's unit; as quaternions if the parents differ."""
+    """float64[J, 3]: mean rotations in the file's unit; as quaternions if the parents differ.
+
+    Args:
+        out: the mix, whose rotation convention is used.
+        turns: float64[J, 3] of each parent, neutral rotations in the file's unit.
+        weights: float64[J, P], weights of the parents.
+    """
     convention = Convention.of(out)
     rows = turns[0].copy()
     for joint in range(len(rows)):
@@ -368,7 +398,8 @@ def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
 
 
 def _maps(out: Dna, parents: Sequence[Dna], shares: Doubles) -> None:
-    """Sets the mean slopes and cuts of the conditional table of animated maps."""
+    """Sets the slopes and cuts of the conditional table of animated maps to the parents' means by
+    their shares in the whole face, float64[P]."""
     maps = copy.copy(parents[0].animated_maps)
     conditionals = copy.copy(maps.conditionals)
     own = [p.animated_maps.conditionals for p in parents]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Finds the regions of a face as soft masks, by the controls that move a vertex; the neck consists
-of the vertices of its joints.
+"""Finds the regions of a face as soft masks, by the controls that move a vertex. The vertices of
+the neck's, spine's and clavicles' joints also belong to the neck.
 
 The masks of a vertex sum to 1. A rigid mesh (eye, teeth, tongue) belongs to one region; meshes on
 the skin (lashes, clear films on the eyes) have the mask of the nearest skin.
@@ -57,7 +57,7 @@ class Masks:
     def __init__(self, dna: Dna, budget: Budget | None = None) -> None:
         """Args:
         dna: the face.
-        budget: limits the computation; None: from budget_of.
+        budget: limits the computation; None: a limit by the size of the face.
         """
         self._dna, self._budget = without_hair(dna), budget
         listed, count = self._dna.lod_mesh_mapping, len(self._dna.meshes)
@@ -99,7 +99,15 @@ class Masks:
 
 
 def _others(dna: Dna, mesh: int, skin: int, masks: Doubles, budget: Budget) -> Doubles:
-    """float64[V, regions]: masks of a rigid mesh, or of a mesh on the skin."""
+    """float64[V, regions]: masks of a rigid mesh, or of a mesh on the skin.
+
+    Args:
+        dna: the face.
+        mesh: index of the mesh.
+        skin: index of the skin mesh of the same LOD.
+        masks: float64[n, regions], masks of the skin's vertices.
+        budget: limits the computation.
+    """
     positions = np.asarray(dna.meshes[mesh].positions, np.float64)
     region = _rigid(dna.mesh_names[mesh])
     if region is not None:
@@ -148,8 +156,8 @@ def _regions_of_controls(dna: Dna) -> dict[int, int]:
 
 
 def _below_head(dna: Dna) -> list[int]:
-    """Indices of the joints of neck and spine, and of their descendants that are not below a head
-    joint."""
+    """Indices of the joints of neck, spine and clavicles, and of their descendants that are neither
+    a head joint nor below one."""
     names, parents = [name.lower() for name in dna.joint_names], dna.joint_parents
     below = [False] * len(names)
     for joint in sk.parent_order(dna):
@@ -166,7 +174,12 @@ def _shares(amounts: Doubles) -> Doubles:
 
 
 def _evened(mesh: Mesh, masks: Doubles) -> Doubles:
-    """Smooths masks over neighbouring vertices, then sharpens them towards the main region."""
+    """Smooths masks over neighbouring vertices, then sharpens them towards the main region.
+
+    Args:
+        mesh: the mesh.
+        masks: float64[V, regions], rows sum to 1.
+    """
     edges = sk.mesh_edges(mesh).astype(np.int64)
     if not len(edges):
         return masks

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Makes textures of mixed faces: blends a texture if all parents have it.
 
-Skin textures are mixed by the shares of the whole face, because skin has one tone; textures of eyes
-use the shares of their region. Only images written by this package are mixed, and no hair textures,
+Skin textures are mixed by the shares of the whole face, because skin has one tone; textures of
+rigid meshes, such as eyes and teeth, use the shares of their region. Only images written by this
+package are mixed, and no hair textures,
 because hair comes from one parent. For other images the file of the parent with the largest share
 is used.
 """
@@ -35,7 +36,7 @@ WHY = {
 }
 """Why an image comes from the leading parent alone: key -> reason."""
 _KEY = "texture:"
-_MOST_BYTES = 1 << 28  # bytes: larger images are refused
+_MOST_BYTES = 1 << 28  # bytes: larger images count as missing
 _MASKS = "*_msk.png"  # wrinkle masks, which have no metadata entry and are recognised by name
 
 
@@ -51,7 +52,8 @@ def texture_folder(path: Path) -> Path:
 def mix_textures(
     parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
 ) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Mixes the textures in the metadata of the leading parent, which has the largest share.
+    """Mixes the textures in the metadata of the leading parent, which has the largest share, and
+    the wrinkle masks (*_msk.png) in its texture folder.
 
     Args:
         parents: compatible faces.
@@ -60,11 +62,14 @@ def mix_textures(
         masks: masks of the first parent's regions.
 
     Returns:
-        File name -> bytes; and file name -> reason (see WHY) for images of the leading parent
-        alone.
+        File name -> bytes; and file name -> key in WHY of the reason, for textures in the metadata
+        that come from the leading parent alone. A texture that the leading parent lacks is left
+        out.
 
     Raises:
         BudgetError: small files that declare huge images.
+        OSError: a wrinkle mask of the leading parent cannot be read.
+        ReadingError: a wrinkle mask of the leading parent is larger than 256 MB.
     """
     whole = mix.whole()
     most = int(whole.argmax())
@@ -110,8 +115,8 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
         there = texture_folder(path) / name
         if there.exists():
             raise ArgumentError(
-                f"{there}: a picture of this name is there, and no {path.name} that it belongs to: "
-                "another name for the new face was expected"
+                f"{there}: a picture of this name is there, and no {path.name} to which it "
+                "belongs: choose another name for the new face"
             )
 
 
@@ -129,7 +134,12 @@ def _data(parent: Dna, path: Path, key: str) -> bytes | None:
 
 
 def _bytes(path: Path, name: str) -> bytes | None:
-    """The bytes of a file in the texture folder or beside the DNA file; None if there is none."""
+    """The bytes of a file in the texture folder or beside the DNA file; None if there is none.
+
+    Args:
+        path: path of the DNA file.
+        name: name of the file to read.
+    """
     for folder in (texture_folder(path), path.parent):
         with contextlib.suppress(OSError, ReadingError):
             return read_file(folder / name, _MOST_BYTES, found=True)
@@ -137,7 +147,12 @@ def _bytes(path: Path, name: str) -> bytes | None:
 
 
 def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
-    """The dictionary key in WHY of the reason why images cannot be mixed; "" if they can."""
+    """The dictionary key in WHY of the reason why images cannot be mixed; "" if they can.
+
+    Args:
+        data: bytes of the image of each parent, or None.
+        shares: float64[P]; parents with the share 0 do not count.
+    """
     counted = [found for found, share in zip(data, shares, strict=True) if share > 0]
     if None in counted:
         return "missing"
@@ -151,7 +166,12 @@ def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
 
 
 def _mixed(data: Sequence[bytes | None], shares: Doubles) -> bytes:
-    """The weighted mean of images with equal sizes; empty if one is damaged."""
+    """The weighted mean of images with equal sizes; empty if one is damaged.
+
+    Args:
+        data: bytes of the image of each parent.
+        shares: float64[P]; parents with the share 0 do not count.
+    """
     counted = {i: data[i] or b"" for i, share in enumerate(shares) if share > 0}
     if len(counted) == 1:
         return next(iter(counted.values()))

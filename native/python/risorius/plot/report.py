@@ -38,9 +38,9 @@ class ExpressionRow:
     motion: float  # RMS displacement of the vertices
     rms: float  # RMS error with joints only
     largest: float  # largest error with joints only
-    between: float  # largest error at the weights 0.25, 0.5 and 0.75
+    between: float  # largest error with joints only at the weights 0.25, 0.5 and 0.75
     with_shapes: float  # largest error with blend shapes
-    worst: str  # mesh and vertex of the largest error
+    worst: str  # mesh name and vertex index of `largest`, with a space between
 
 
 def render(
@@ -59,8 +59,8 @@ def render(
         worst: the expressions to draw, with the errors of a rig that uses joints only.
         dpi: resolution of bitmaps in dots per inch.
     """
-    # The colour scale ends at 1.25 times the median error, because with a scale up to one very
-    # large error all other heads would have no colour.
+    # The colour scale ends at 1.25 times the median of the drawn expressions' largest errors,
+    # because with a scale up to one very large error all other heads would have no colour.
     most = 1.25 * float(np.median([e.largest for e in worst] or [0.05]))
     lines = [
         f"{level.joints:,} joints, {level.vertices:,} vertices\n"

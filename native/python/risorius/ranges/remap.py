@@ -60,7 +60,8 @@ class Range(NamedTuple):
         return 1.0 / (self.extreme - self.neutral)
 
     def calibrated(self) -> Range:
-        """The range of the control after process.calibrate subtracted the neutral face."""
+        """The range of the control in a capture whose values v were replaced by
+        (v - neutral) / (1 - neutral)."""
         return Range(0.0, (self.extreme - self.neutral) / (1.0 - self.neutral))
 
     def trouble(self) -> tuple[str, str] | None:
@@ -110,6 +111,9 @@ class Ranges:
 
     def apply(self, clip: Clip) -> Clip:
         """Rescales a clip of raw controls; other curves stay bitwise equal.
+
+        Args:
+            clip: the clip; returned itself if no curve has a range that is used.
 
         Raises:
             ArgumentError: the clip was rescaled before.

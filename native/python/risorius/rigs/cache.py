@@ -26,20 +26,22 @@ def compile_cached(
 ) -> Rig:
     """Compiles a DNA file, or loads its rig from the cache if it was compiled before.
 
-    The cache file is named by a hash of the DNA's bytes, the options, this version and the byte
-    order, so an edited DNA gets another file. A hash of the cached content is checked each time,
-    and a damaged file is replaced. If the folder cannot be written, the face is compiled each time
-    without an error. Nothing is ever deleted; users may delete files.
+    The cache file is named by a hash of the DNA's bytes, precision, rotation, this version and the
+    byte order, so an edited DNA gets another file. A hash of the cached content is checked each
+    time, and a damaged file is replaced. If the folder cannot be written, the face is compiled each
+    time without an error. Nothing is ever deleted; users may delete files.
 
     Args:
         path: path of a DNA file.
         cache_dir: folder of the cache, created if missing; None: a folder in the user's caches. If
             others may write to it, its files are checked like DNA files (see Rig.load), because a
             hash detects damage but not forgery.
-        precision, rotation, simd: see Rig.
+        precision: "float32" or "float16", number format of the joint coefficients.
+        rotation: "euler" or "quaternion", form of the evaluated joint rotations.
+        simd: instruction set of the evaluation; None: the best one of the processor.
 
     Raises:
-        DnaError: see load and Rig.
+        DnaError: a file that cannot be read or compiled.
         ValueError: an unknown option.
     """
     try:

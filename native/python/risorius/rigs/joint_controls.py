@@ -28,7 +28,8 @@ ANGLES = {
 }
 """Names of curves in a clip that rotate neck and head, in radians; see head_turns."""
 _NOTHING = 1e-7  # quaternion components smaller than this count as 0
-# File axis -> direction in the face's own axes: x to its left, y to its back, z up.
+# File axis -> direction in the face's own axes: x to its left, y to its back, z up. "right" in a
+# file is the right side of a viewer in front of the face, and so the face's left.
 _FACE_AXES = {
     "right": (1.0, 0.0, 0.0),
     "left": (-1.0, 0.0, 0.0),
@@ -44,7 +45,8 @@ class JointControl:
     """The four raw controls that hold the rotation of one joint.
 
     Attributes:
-        joint: index of the joint; name: its name in the file.
+        joint: index of the joint.
+        name: name of the joint in the file.
         controls: indices of the raw controls of x, y, z and w.
         axes: float64[3, 3], converts a rotation's vector part from the face's axes (x to the face's
             left, y to its back, z up) to the joint's axes.
@@ -63,14 +65,15 @@ class JointControl:
                 neutral pose, about the face's axes.
 
         Returns:
-            float64[..., 4], see one_sign.
+            float64[..., 4], quaternions x, y, z, w whose last nonzero component is positive.
         """
         given = np.asarray(turns, np.float64)
         return one_sign(np.concatenate([given[..., :3] @ self.axes.T, given[..., 3:]], axis=-1))
 
 
 def one_sign(turns: Doubles) -> Doubles:
-    """Choose q or -q, which are the same rotation, so that the last nonzero component is positive.
+    """float64[..., 4]: q or -q, which are the same rotation, whichever has a positive last nonzero
+    component.
 
     RBF solvers with Euclidean distances distinguish q from -q.
 
@@ -144,7 +147,8 @@ def _read_by_solvers(dna: Dna) -> set[int]:
 
 
 def turn_axes(dna: Dna, joint: int) -> Doubles:
-    """float64[3, 3]: the axes of a joint, see JointControl.axes.
+    """float64[3, 3]: converts a rotation's vector part from the face's axes (x to the face's left,
+    y to its back, z up) to the axes of a joint.
 
     Args:
         dna: the face.
@@ -197,7 +201,8 @@ def shared(turns: Doubles, share: float) -> Doubles:
     """The fraction `share` of rotations, along the shorter way.
 
     Args:
-        turns: float64[..., 4], x, y, z, w of unit quaternions; share: 0 to 1.
+        turns: float64[..., 4], unit quaternions x, y, z, w.
+        share: the fraction, 0 to 1.
     """
     turns = np.where(turns[..., 3:] < 0.0, -turns, turns)
     sine = np.linalg.norm(turns[..., :3], axis=-1, keepdims=True)
@@ -214,7 +219,8 @@ def bone_turns(bone: str, curves: Mapping[str, npt.NDArray[np.float32]]) -> Doub
         curves: name -> float32[frames], all curves of the clip.
 
     Returns:
-        float64[frames, 4], see head_turns; None if the clip has no such curve.
+        float64[frames, 4], quaternions x, y, z, w about the face's axes (x to its left, y to its
+        back, z up); None if the clip has no yaw, pitch or roll of this bone.
     """
     rows = [curves.get(name) for name in ANGLES.get(bone, ())]
     some = next((row for row in rows if row is not None), None)
@@ -232,7 +238,7 @@ def head_turns(angles: npt.NDArray[Any]) -> Doubles:
             left shoulder; applied in this order, each about the already rotated axes.
 
     Returns:
-        float64[n, 4], x, y, z, w about the face's axes (see JointControl.axes).
+        float64[n, 4], x, y, z, w about the face's axes: x to its left, y to its back, z up.
     """
     half = np.asarray(angles, np.float64) / 2.0
     (sy, sp, sr), (cy, cp, cr) = np.sin(half.T), np.cos(half.T)

@@ -203,15 +203,15 @@ def _files() -> str:
         for _ in range(2):  # the second save replaces the first file
             load(whole).save(str(path))
             if path.read_bytes() != whole:
-                raise _Failed("the file that was read differs from the file that was written")
+                raise _Failed("the saved file differs from the original file")
         if load(path).to_bytes() != whole:
-            raise _Failed("the face that was read from the file differs from the bytes of the file")
+            raise _Failed("the saved file, loaded and written again, differs from itself")
         names = load(whole).raw_control_names
         curves = np.linspace(0, 1, 5 * len(names), dtype=np.float32).reshape(-1, 5)
         clip = path.with_suffix(".rzc")
         Clip(names, curves, 30.0).save(clip)
         if not np.array_equal(Clip.load(clip).curves, curves):
-            raise _Failed("the clip that was read differs from the clip that was written")
+            raise _Failed("the clip that was loaded differs from the clip that was saved")
         fileio.write_bytes(path, b"")
         if path.read_bytes() != b"":
             raise _Failed("a file could not be replaced")

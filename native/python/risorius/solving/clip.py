@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Finds the control curves that reproduce a moving mesh.
 
-First each frame is solved alone, starting from the solution of the frame before: few controls
+First each frame is solved alone, starting from the solution of an earlier frame: few controls
 within their limits that bring the face nearest to the mesh. A control's value has a price, so that
 noise alone does not set controls. Then the selected controls are solved with a far smaller price,
 all frames together, with a price on sudden changes of speed. The noise is measured, so that curves
@@ -31,12 +31,16 @@ _CHUNK = 24  # number of frames that are solved in sequence, starting from the f
 _AROUND = 8  # frames before and after a chunk that are smoothed with it
 _FLOOR_MM = 0.004  # mm: smallest noise that is assumed
 _WORTH = 3.0  # price of a control in standard errors of its value
-_LEAST = 0.01  # a control whose curve has a smaller range is not used
+# A control that never differs from its initial value by more than this number is not used; if
+# `sparse` is 0, every control that differs is used.
+_LEAST = 0.01
 # lowest and highest value assumed for the typical second difference of a control's curve, at 30
 # frames per second
 _SUDDEN = (0.004, 0.5)
 _SOON = 0.1  # change of a control above which derivatives are recomputed
-_ENOUGH = 5e-4  # a smaller change of all controls ends an iteration
+# A smaller change of all controls ends an iteration. A control that never differs from its initial
+# value by more gets no curve.
+_ENOUGH = 5e-4
 
 
 class CancelledError(RisoriusError):
@@ -52,7 +56,8 @@ class SolvedClip(NamedTuple):
     frame_residual: Floats
     """float32[F]: root mean square distance of the vertices per frame, in the file's unit."""
     vertex_residual: dict[int, Floats]
-    """Mesh -> float32[V]: root mean square distance of each vertex over all frames."""
+    """Mesh -> float32[V]: root mean square distance of each vertex over all frames, in the file's
+    unit."""
     largest: float
     """Largest distance of a vertex in any frame, in the file's unit."""
     noise: float
@@ -154,7 +159,7 @@ def solve_clip(
         limits: the controls that may change, and their ranges; None: all except rotation
             components, from 0 to 1.
         most_points: largest number of compared vertices; residuals cover all vertices.
-        threads: number of threads; 0: all cores. It does not influence the result.
+        threads: number of threads, which does not influence the result; 0: all cores.
         progress: called with the fraction of the work done, 0 to 1; returning False cancels.
         keywords: fields of ControlLimits, if `limits` is None.
 
@@ -194,14 +199,25 @@ def _check_numbers(rate: float, start: float, sparse: float, smooth: float) -> N
 
 
 def _targets(moved: dict[int, Floats], points: npt.NDArray[np.int64]) -> Floats:
-    """float32[F, P, 3]: target positions of the points (mesh, vertex) in `points`."""
+    """float32[F, P, 3]: target positions of the points (mesh, vertex) in `points`.
+
+    Args:
+        moved: index of a mesh -> float32[F, V, 3], its target positions.
+        points: int64[P, 2], mesh and vertex of each point, sorted by mesh.
+    """
     return np.concatenate(
         [moved[mesh][:, points[points[:, 0] == mesh, 1]] for mesh in sorted(moved)], axis=1
     )
 
 
 def _curves(job: _Job, count: int, workers: int) -> Doubles:
-    """float64[F, R]: controls of all frames, solved frame by frame, then together."""
+    """float64[F, R]: controls of all frames, solved frame by frame, then together.
+
+    Args:
+        job: input of the solve; its expected error is raised to the remaining error.
+        count: number of frames F.
+        workers: number of threads.
+    """
     begins = _begins(job, count)
     left = np.mean([_left(job, raw, f) for f, raw in begins.items()])
     # The remaining error counts as noise, because the motion of another face is never
@@ -220,7 +236,14 @@ def _begins(job: _Job, count: int) -> dict[int, Doubles]:
 
 
 def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> Doubles:
-    """float64[F, R]: controls of all frames, each frame solved alone."""
+    """float64[F, R]: controls of all frames, each frame solved alone.
+
+    Args:
+        job: input of the solve.
+        count: number of frames F.
+        begins: first frame of each chunk -> float64[R], the controls in this frame.
+        workers: number of threads.
+    """
     curves = np.tile(job.rest, (count, 1))
 
     def chunk(begin: int) -> None:
@@ -235,12 +258,25 @@ def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> D
 
 
 def _prices(job: _Job, matrix: Doubles) -> Doubles:
-    """float64[R]: price per unit of each control, a multiple of the gradient from noise alone."""
+    """float64[R]: price per unit of each control, a multiple of the gradient from noise alone.
+
+    Args:
+        job: input of the solve.
+        matrix: float64[R, R], normal matrix J^T J of the derivatives.
+    """
     return job.sparse * _WORTH * np.sqrt(np.maximum(np.diag(matrix), 0)) / job.sigma
 
 
 def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) -> Doubles:
-    """float64[R]: the controls of one frame, solved alone."""
+    """float64[R]: the controls of one frame, solved alone.
+
+    Args:
+        job: input of the solve.
+        frame: derivatives at a near pose; they are computed again if the pose is not near.
+        index: index of the frame.
+        start: float64[R], the pose where the iteration starts.
+        rounds: largest number of Newton steps.
+    """
     at, missing = start, frame.missing(start, index)
     scale = job.sigma**-2
     for _ in range(rounds):
@@ -273,8 +309,14 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
     sudden changes.
 
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
-    controls that the frames solved alone use may change; the price of their values is only
-    `sparse` per unit.
+    controls that differ from their initial values by more than _LEAST in some frame solved alone
+    may change; the price of a change is only job.sparse per unit of the control. Without such
+    controls, `curves` is returned.
+
+    Args:
+        job: input of the solve.
+        curves: float64[F, R], the frames solved alone.
+        workers: number of threads.
     """
     count = len(curves)
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > (_LEAST if job.sparse else 0))
@@ -310,8 +352,13 @@ def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Double
     """float64[F - 2, used]: price of a sudden change of each control, at each frame.
 
     The price is job.smooth / d^2, where d is the typical second difference of the control's curve
-    without noise. Near a frame whose own second difference is clearly above the noise, d is that
-    local value. A blink therefore stays sharp while a slow jaw is smoothed.
+    without noise. Near a frame whose own second difference is clearly above the noise, d is at
+    least that local value. A blink therefore stays sharp while a slow jaw is smoothed.
+
+    Args:
+        job: input of the solve.
+        curves: float64[F, R], the frames solved alone.
+        used: indices of the controls that may change.
     """
     if len(curves) < 3:
         return np.zeros((0, len(used)))
@@ -340,7 +387,16 @@ def _smoothed(
     aims: list[Doubles],
 ) -> Doubles:
     """float64[n, used]: curves after sweeps forwards and backwards through the frames, until no
-    control changes."""
+    control changes by more than _ENOUGH (at most 20 sweeps).
+
+    Args:
+        job: input of the solve.
+        curves: float64[n, used], values of the used controls; changed in place.
+        used: indices of the used controls.
+        stiff: float64[n - 2, used], prices of the squared second differences.
+        matrices: per frame float64[used, used], normal matrix / job.sigma^2.
+        aims: per frame float64[used], the right side of the normal equations / job.sigma^2.
+    """
     count = len(curves)
     bend = np.diff(np.eye(count), 2, axis=0) if count > 2 else np.zeros((0, count))
     bends = np.einsum("ti,tc,tj->ijc", bend, stiff, bend)  # [n, n, used]
@@ -386,7 +442,8 @@ def _result(
 
 
 def _left(job: _Job, raw: Doubles, frame: int) -> float:
-    """The mean squared residual per coordinate of a frame."""
+    """The mean squared residual per coordinate of a frame at the pose `raw`, in the file's unit
+    squared."""
     probe = job.surface.probe(job.points)
     return float(((job.targets[frame] - probe.positions(raw)) ** 2).mean())
 
@@ -394,7 +451,11 @@ def _left(job: _Job, raw: Doubles, frame: int) -> float:
 def _noise(targets: Floats) -> float:
     """The standard deviation of the noise of a coordinate, in the file's unit.
 
-    Fourth differences remove most of a movement and multiply the noise by sqrt(70).
+    Fourth differences over the frames remove most of a movement and multiply the noise by sqrt(70).
+    Fewer than 5 frames give 0.
+
+    Args:
+        targets: float32[F, P, 3], positions of the points.
     """
     if len(targets) < 5:
         return 0.0
@@ -405,7 +466,16 @@ def _noise(targets: Floats) -> float:
 def _points(
     surface: Surface, wanted: dict[int, Floats], bounds: Bounds, most: int
 ) -> npt.NDArray[np.int64]:
-    """int64[P, 2]: mesh and vertex of evenly selected vertices that some control moves."""
+    """int64[P, 2]: mesh and vertex of at most `most` evenly selected vertices.
+
+    Some control moves each of them by more than 0.1 mm per unit.
+
+    Args:
+        surface: surface of the face.
+        wanted: index of a mesh -> its target positions; only the indices are used.
+        bounds: checked limits of the controls.
+        most: largest number of vertices.
+    """
     if most < 1:
         raise ArgumentError(f"most_points: 1 or more was expected, found {most}")
     rest = surface.rig.initial_raw_controls
@@ -456,7 +526,10 @@ def _meshes(
 def _frame_count(frames: dict[int, Floats]) -> int:
     counts = {len(array) for array in frames.values()}
     if len(counts) > 1 or 0 in counts:
-        raise ArgumentError(f"frames: as many of each mesh were expected, found {sorted(counts)}")
+        raise ArgumentError(
+            "frames: as many frames for each mesh, and at least one, were expected, found "
+            f"{sorted(counts)}"
+        )
     return counts.pop()
 
 
@@ -465,7 +538,14 @@ def _moved(
     wanted: dict[int, Floats],
     neutral: npt.ArrayLike | Mapping[int, npt.ArrayLike] | None,
 ) -> dict[int, Floats]:
-    """Mesh -> float32[F, V, 3]: target positions for the face's own vertices."""
+    """Mesh -> float32[F, V, 3]: target positions for the face's own vertices.
+
+    Args:
+        surface: surface of the face.
+        wanted: mesh -> float32[F, V, 3], vertices of the moving mesh.
+        neutral: mesh -> float[V, 3], the moving mesh with a neutral face, whose displacements are
+            then added to the face's own neutral; None: `wanted` is returned.
+    """
     if neutral is None:
         return wanted
     own = _meshes("neutral", surface, neutral, 2)

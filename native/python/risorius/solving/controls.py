@@ -69,7 +69,8 @@ class ControlSharing:
     amount, such as left and right in a symmetric drag. None: no partners."""
     opposites: Sequence[tuple[int, int]] = ()
     """Pairs of controls of which at most one may be on, such as mouthLeft and mouthRight. On an
-    asymmetric face both together would fit best but look wrong. Pairs of partners are ignored."""
+    asymmetric face both together would fit best but look wrong. Opposites that are also partners
+    keep their values."""
 
 
 class LimitFields(TypedDict, total=False):
@@ -111,7 +112,10 @@ def structure(
         return make(**{field: keywords[field] for field in own})
     if own:
         found = ", ".join(sorted(own))
-        raise ArgumentError(f"{name}: no {found} beside it was expected, found both")
+        raise ArgumentError(
+            f"{name}: no {found} beside it was expected, found both: give the values in one of "
+            "the two"
+        )
     return given
 
 

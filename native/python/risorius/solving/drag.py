@@ -90,7 +90,8 @@ def solve_drag(
             until the points are less than 1.3 mm farther away than with least squares without ease.
         smallest: price of a change, relative to the effect of the strongest control; a larger value
             misses the target by more.
-        rounds: largest number of linearisations.
+        rounds: largest number of linearisations of one solution by least squares; "transpose" uses
+            up to three times this number.
         keywords: fields of ControlLimits and ControlSharing, if these arguments are None.
 
     Raises:
@@ -121,7 +122,17 @@ def _solved(
     smallest: float,
     rounds: int,
 ) -> Doubles:
-    """float64[R]: the pose found by a method, with at most one control of each opposite pair on."""
+    """float64[R]: the pose found by a method, in which at most one control of each opposite pair
+    increases.
+
+    Args:
+        drag: equations of the drag.
+        begin: float64[R], the pose at the beginning.
+        pairs: int64[N, 2], indices of opposite controls.
+        method: one of METHODS.
+        smallest: price of a change, relative to the effect of the strongest control.
+        rounds: largest number of linearisations.
+    """
 
     def exactly(drag: Drag, start: Doubles) -> Doubles:
         return least_squares(drag, begin, start, smallest, rounds)
@@ -156,9 +167,17 @@ def _kept_apart(
     opposites: npt.NDArray[np.int64],
     solve: Callable[[Drag, Doubles], Doubles],
 ) -> Doubles:
-    """The pose from `solve` in which only the stronger control of each opposite pair is on.
+    """float64[R]: the pose from `solve`; if both controls of an opposite pair would increase, the
+    weaker one keeps its value.
 
-    An opposite that was on at the beginning returns to 0 before the other one starts.
+    An opposite that was on at the beginning returns to 0 before the other one starts. Opposites
+    that are also partners keep their values.
+
+    Args:
+        drag: equations of the drag.
+        begin: float64[R], the pose at the beginning.
+        opposites: int64[N, 2], indices of opposite controls.
+        solve: finds a pose from the equations and a start pose.
     """
     partner = np.arange(len(begin))
     partner[drag.unknowns.first] = drag.unknowns.second
@@ -184,6 +203,11 @@ def _both_on(
     """(weaker, stronger) controls of each opposite pair whose smaller value increased from `begin`.
 
     The weaker control has the smaller value in `begin`, or in `at` if both are equal in `begin`.
+
+    Args:
+        opposites: int64[N, 2], indices of opposite controls.
+        at: float64[R], a solved pose.
+        begin: float64[R], the pose at the beginning.
     """
     before = np.maximum(begin[opposites].min(axis=1), 0.0)
     pairs = opposites[at[opposites].min(axis=1) > before + ON]
@@ -193,7 +217,13 @@ def _both_on(
 
 
 def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
-    """Gradient descent within the limits; each step's length minimises the linearised error."""
+    """Gradient descent within the limits; each step's length minimises the linearised error.
+
+    Args:
+        drag: equations of the drag.
+        at: float64[R], the pose where the descent starts.
+        rounds: a third of the largest number of steps.
+    """
     for _ in range(max(1, 3 * rounds)):
         jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
         toward = drag.unknowns.columns(jacobian).T @ missing
@@ -210,10 +240,12 @@ def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     """float64[R]: the ease of each control at dragged points, for solve_drag.
 
-    Controls of other parts of the face (see LOCAL) get the small ease ELSEWHERE, so that a dragged
-    brow does not turn the eyes, although turning the eyes moves the brow. The others get an ease by
-    the ratio of their effect here to their effect on the whole face, so that the brow lowers before
-    the whole face contracts, which would lower it too. The largest ease is 1.
+    Controls of other parts of the face, whose effect at the points is small compared with their
+    effect elsewhere, get the ease ELSEWHERE (0.001), so that a dragged brow does not turn the eyes,
+    although turning the eyes moves the brow. The ease of the other controls is the root of the
+    ratio of their effect at the points to their mean effect on the whole face, divided by the
+    largest such root, so that the largest ease is 1. The brow therefore lowers before the whole
+    face contracts, which would lower it too.
 
     Args:
         surface: surface of the face.
@@ -225,7 +257,7 @@ def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     local = share >= LOCAL * share.max(initial=0.0)
     alone = here / np.maximum(surface.spread(), 1e-30)
     # solve_drag squares the cost of a change, so the change grows with the square of the ease.
-    # The root makes it proportional to `alone`.
+    # The root makes the change proportional to the ratio `alone`.
     readiness = np.sqrt(alone / np.maximum(alone[local].max(initial=0.0), 1e-30))
     return np.where(local, np.maximum(readiness, ELSEWHERE), ELSEWHERE)
 
@@ -279,7 +311,13 @@ def best_controls(
 
 def _alone(drag: Drag, begin: Doubles, control: int) -> tuple[int, float, float]:
     """The control, its best value, and the remaining distance; solved by secants, because the face
-    is not linear."""
+    is not linear.
+
+    Args:
+        drag: equations of the drag.
+        begin: float64[R], the pose of all other controls.
+        control: index of the control.
+    """
     low, high = float(drag.low[control]), float(drag.high[control])
     places = np.linspace(low, high, 5)
     at = begin.copy()

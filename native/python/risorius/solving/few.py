@@ -34,7 +34,7 @@ _WEAKEST = 0.01  # fraction of the strongest control's effect below which a cont
 _STILL = 1e-4  # a smaller change of all controls ends the iteration
 _GONE = 0.01  # price of a control that has already changed
 _HALVES = 5  # number of bisections between two poses
-_FEW = 2  # if more controls were selected, fewer are tried
+_FEW = 2  # superfluous controls are searched for only if more controls than this were selected
 _FREED = 4.0  # limits of a selected control during the fit, as a multiple of its selected change
 
 
@@ -51,7 +51,8 @@ def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Do
     Args:
         drag: equations of the drag.
         begin: float64[R], the pose at the beginning.
-        smallest, rounds: see solve_drag.
+        smallest: price of a change, relative to the effect of the strongest control.
+        rounds: largest number of linearisations.
     """
     price, elsewhere = prices(drag)
     units = drag.unknowns.alike()
@@ -87,6 +88,13 @@ def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int
     `x` is float64[U], values of the unknowns. The function uses full Gauss-Newton steps, whose
     result is continuous in the targets. If the result is far from the targets, halved steps are
     tried, too, and the nearer result is used.
+
+    Args:
+        drag: equations of the drag.
+        begin: float64[R], the pose at the beginning.
+        x: float64[U], values of the unknowns; unknowns with the value 0 stay 0.
+        smallest: price of a change, relative to the effect of the strongest control.
+        rounds: largest number of linearisations.
     """
     units, change = drag.unknowns, drag.unknowns.change(x, len(begin))
     drag = drag.held([*map(int, np.flatnonzero(change == 0))], begin)
@@ -113,8 +121,11 @@ def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int
 
 
 def prices(drag: Drag) -> tuple[Doubles, npt.NDArray[np.bool_]]:
-    """float64[U], bool[U]: the price of each unknown by its ease, and whether the unknown belongs
-    to another part of the face than the points.
+    """float64[U], bool[U]: the price of each unknown, and whether the unknown belongs to another
+    part of the face than the points.
+
+    The price is the largest ease divided by the ease of the unknown, but _DEAR (100) for an unknown
+    of another part.
 
     Args:
         drag: equations of the drag.
@@ -132,7 +143,10 @@ def nearer(
     every: Doubles,
     pairs: npt.NDArray[np.int64],
 ) -> Doubles:
-    """Adds controls until the points are at most BEHIND_MM farther away than with all controls.
+    """float64[R]: a pose with more controls than `few`: the points are at most BEHIND_MM (1.3 mm)
+    farther from the targets than with all controls.
+
+    If `few` is near enough, it is returned unchanged.
 
     Args:
         drag: equations of the drag, with unknowns of equal ease.
@@ -159,10 +173,18 @@ def nearer(
 def _agreeing(
     drag: Drag, begin: Doubles, few: Doubles, every: Doubles, pairs: npt.NDArray[np.int64]
 ) -> tuple[Drag, Doubles]:
-    """For each control that is on in the pose `every`, fixes its opposite.
+    """For each control that is positive in the pose `every` and larger than in `begin`, fixes its
+    opposite.
 
     Returns: the drag with these controls fixed, and the pose `few` in which each fixed control has
         the smaller of its values in `few` and `every`.
+
+    Args:
+        drag: equations of the drag.
+        begin: float64[R], the pose at the beginning.
+        few: float64[R], the pose with few controls.
+        every: float64[R], the pose with all controls.
+        pairs: int64[N, 2], indices of opposite controls.
     """
     on = every[pairs] > np.maximum(begin[pairs], 0.0) + ON
     off = [
@@ -177,10 +199,18 @@ def _agreeing(
 
 
 def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: float) -> Doubles:
-    """A pose with additional controls: by linear equations, it is at most `aim` mm from the
-    targets.
+    """A pose with additional controls: by linear equations, the full change brings the points to at
+    most `aim` mm from the targets, or as near as possible.
 
+    Of the full, half and quarter change the one that brings the points nearest is returned.
     Controls that have already changed have a price near 0.
+
+    Args:
+        drag: equations of the drag.
+        price: float64[U], price of each unknown that has not changed yet.
+        begin: float64[R], the pose at the beginning.
+        at: float64[R], the pose to which controls are added.
+        aim: wanted distance from the targets in mm.
     """
     units, count = drag.unknowns, len(begin)
     jacobian, missing = units.columns(drag.jacobian(at)), drag.residual(drag.positions(at))
@@ -201,8 +231,17 @@ def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: flo
 
 
 def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Doubles:
-    """The pose `every` without its weakest controls: as many as leave the distance from the targets
-    at most `aim` - BEHIND_MM / 2."""
+    """The pose `every` with its weakest controls returned to `begin`.
+
+    The number of these controls is the largest with which the points are at most
+    `aim` - BEHIND_MM / 2 mm from the targets.
+
+    Args:
+        drag: equations of the drag.
+        begin: float64[R], the pose at the beginning.
+        every: float64[R], the pose with all controls.
+        aim: wanted distance from the targets in mm.
+    """
     units = drag.unknowns
     change = units.values(every - begin)
     order = np.argsort(np.abs(change) * np.linalg.norm(units.columns(drag.jacobian(every)), axis=0))
@@ -221,7 +260,16 @@ def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Dou
 
 
 def _towards(drag: Drag, at: Doubles, other: Doubles, aim: float) -> Doubles:
-    """The first pose from `at` towards `other` that is near enough to the targets, by bisection."""
+    """The first pose from `at` towards `other` that is at most `aim` mm from the targets, by
+    bisection.
+
+    Args:
+        drag: equations of the drag.
+        at: float64[R], the pose where the way begins.
+        other: float64[R], the pose where the way ends; it is returned if no pose before it is near
+            enough.
+        aim: wanted distance from the targets in mm.
+    """
     if drag.far(at) <= aim:
         return at
     none, whole = 0.0, 1.0

@@ -2,8 +2,8 @@
 """Places handles for dragging: few vertices by which as many controls as possible can be set.
 
 The idea is from Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable Face-Rig
-Manipulation", ACM Transactions on Graphics 40 (4), 2021. They use integer programming; here handles
-are chosen one after the other, each for controls that the earlier ones cannot move.
+Manipulation", ACM Transactions on Graphics 40 (4), 2021. The authors use integer programming; here
+handles are chosen one after the other, each for controls that the earlier ones cannot move.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _CHUNK = 1024  # vertices whose Jacobian is computed together
 def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[np.int64]:
     """int64[n]: vertices of a mesh that are good handles, best first; n is at most count.
 
-    On a symmetric face the handles are symmetric too.
+    On a symmetric face the handles are symmetric too, but the last one may lack its mirror image.
 
     Args:
         surface: surface of the face.
@@ -78,7 +78,13 @@ def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int
 
 def _reach(surface: Surface, mesh: int, vertices: npt.NDArray[np.int64]) -> Floats:
     """float32[n, 3, R]: displacement of each vertex per unit of each control, from
-    the neutral pose."""
+    the neutral pose.
+
+    Args:
+        surface: surface of the face.
+        mesh: index in dna.meshes.
+        vertices: int64[n], indices of vertices.
+    """
     rest = surface.rig.initial_raw_controls
     parts = [vertices[i : i + _CHUNK] for i in range(0, len(vertices), _CHUNK)]
     return np.concatenate([surface.jacobian(rest, mesh, part) for part in parts])

@@ -87,7 +87,14 @@ def make_drag(
     """Checks the arguments, and makes the equations of a drag.
 
     Args:
-        surface, raw, points, targets, axes, weights, limits, sharing: see solve_drag.
+        surface: surface of the face.
+        raw: float64[R], raw controls at the beginning of the drag.
+        points: (mesh, vertex) of each of the P points.
+        targets: float[P, 3], target positions in the file's unit.
+        axes: float[P, k, 3], unit vectors along which distances count; None: all three axes.
+        weights: float[P] of 0 or more, importance of each point; None: 1.
+        limits: the controls that may change, and their ranges.
+        sharing: how the drag is distributed over the controls.
 
     Raises:
         ArgumentError: an invalid argument.
@@ -129,7 +136,7 @@ class Unknowns:
     scale: Doubles  # [U]: change of each control per unit of the unknown
 
     def alike(self) -> Unknowns:
-        """The same unknowns, all with the same ease (see ControlSharing)."""
+        """The same unknowns, all with the ease 1, so that all controls change equally readily."""
         return replace(self, ease=np.ones_like(self.ease), scale=self.scale / self.ease)
 
     def columns(self, jacobian: Doubles) -> Doubles:
@@ -178,15 +185,17 @@ def _unknowns(count: int, partners: npt.ArrayLike | None, ease: Doubles) -> Unkn
 def least_squares(
     drag: Drag, begin: Doubles, start: Doubles, smallest: float, rounds: int
 ) -> Doubles:
-    """Minimises distances and change by Gauss-Newton.
+    """float64[R]: the pose that minimises the squared residuals plus the price of the squared
+    change, by Gauss-Newton.
 
-    If a step does not reduce the sum of both, half and then a quarter of the step is tried.
+    If a step does not reduce this sum, half and then a quarter of the step is tried.
 
     Args:
         drag: equations of the drag.
         begin: float64[R], the pose from which changes are measured.
         start: float64[R], the pose where the iteration starts.
-        smallest, rounds: see solve_drag.
+        smallest: price of a change, relative to the effect of the strongest control.
+        rounds: largest number of linearisations.
     """
     at = np.clip(start, drag.low, drag.high)
     missing = drag.residual(drag.positions(at))
@@ -194,7 +203,9 @@ def least_squares(
     low, high = drag.unknowns.limits(drag.low - begin, drag.high - begin)
     for _ in range(max(1, rounds)):
         jacobian = drag.unknowns.columns(drag.jacobian(at))
-        if price < 0:  # constant, so that a later round does not give up the gain of an earlier one
+        # The price is computed in the first round only. With another price, a later round could
+        # give up the gain of an earlier one.
+        if price < 0:
             strongest = float((jacobian**2).sum(axis=0).max(initial=0))
             price = max(smallest**2 * strongest, 1e-20)
         here = drag.unknowns.values(at - begin)

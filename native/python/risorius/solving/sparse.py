@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from .surface import Doubles
 
-_REST, _MOVES, _BOUND = 0, 1, 2  # states of an unknown: 0, moving, at a bound
+_REST, _MOVES, _BOUND = 0, 1, 2  # states of an unknown: at the value 0, moving, at a bound
 _MOST_STEPS = 600  # largest number of steps of a path
 # largest number of path steps in cheapest_to(); the result of a longer path is not sparse
 _MOST_MORE = 60
@@ -27,7 +27,8 @@ _FAR = 0.1  # fraction of the first residual: a target that stays farther away i
 # fraction of the possible gain that may be given up to use fewer controls, if the target is out of
 # reach
 _LITTLE = 0.1
-_CALM = 0.12  # fraction of the first price below which controls hardly help, for such a target
+# fraction of the first price below which controls hardly help, if the target is out of reach
+_CALM = 0.12
 _LEVEL = 1e-9  # smaller differences of slopes count as none
 
 
@@ -113,7 +114,12 @@ class _Path:
         self.state[which], self.sign[which] = _MOVES, np.sign(self.pull[which])
 
     def _stops(self, rate: Doubles) -> tuple[Doubles, Doubles]:
-        """The value at which each moving unknown stops, and the price's decrease until then."""
+        """float64[n] each: the value at which each moving unknown stops, and the price's decrease
+        until then (infinite if it does not move).
+
+        Args:
+            rate: float64[n], change of each unknown per decrease of the price.
+        """
         stop = np.where(rate > 0, self.high, self.low)
         back = (self.x * rate < 0) | ((self.x == 0) & (rate * self.sign < 0))
         stop = np.where(back, 0.0, stop)
@@ -122,8 +128,12 @@ class _Path:
         return stop, when
 
     def _begins(self, slope: Doubles) -> tuple[Doubles, Doubles]:
-        """For each unknown that stays at 0, the price's decrease until the unknown begins to move,
-        and the direction of its motion."""
+        """float64[n] each: for each unknown that stays at 0, the price's decrease until the unknown
+        begins to move, and the direction of its motion (1 or -1).
+
+        Args:
+            slope: float64[n], decrease of `pull` per decrease of the price.
+        """
         rests = self.state == _REST
         if self.left >= 0:
             rests[self.left] = False
@@ -137,7 +147,11 @@ class _Path:
         return np.minimum(up, down), np.where(up <= down, 1.0, -1.0)
 
     def _moves_again(self, slope: Doubles) -> Doubles:
-        """The decrease of the price until each unknown at a bound leaves it."""
+        """float64[n]: the decrease of the price until each unknown at a bound leaves it.
+
+        Args:
+            slope: float64[n], decrease of `pull` per decrease of the price.
+        """
         falls = self.sign * slope - 1
         there = (self.state == _BOUND) & (falls > _LEVEL)
         if self.left >= 0:
@@ -185,7 +199,8 @@ def cheapest_change(
         # The target is out of reach: controls that hardly help are left out.
         there = _at_price(nodes, prices, calm)
         aim = max(aim, there) if there - near <= _LITTLE * (way - near) else aim
-    return np.clip(_where(nodes, aim) / price, low, high)  # because of rounding errors
+    # Rounding errors could leave the bounds.
+    return np.clip(_where(nodes, aim) / price, low, high)
 
 
 def cheapest_to(
@@ -211,7 +226,13 @@ def cheapest_to(
 
 
 def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: float) -> float:
-    """The length of the residual at the point of the path with this price."""
+    """The length of the residual at the point of the path with the price `price`.
+
+    Args:
+        nodes: (x, residual) at each corner of the path.
+        prices: price at each corner, falling.
+        price: price of the wanted point; a lower price than all corners have means the last corner.
+    """
     for (_, long), (_, short), before, after in zip(
         nodes, nodes[1:], prices, prices[1:], strict=False
     ):
@@ -222,7 +243,13 @@ def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: 
 
 
 def _where(nodes: list[tuple[Doubles, Doubles]], aim: float) -> Doubles:
-    """float64[n]: the first point on a path at which the residual is at most `aim` long."""
+    """float64[n]: x at the first point of a path at which the residual is at most `aim` long, or at
+    the end of the path.
+
+    Args:
+        nodes: (x, residual) at each corner of the path.
+        aim: length of the residual.
+    """
     for (x, long), (then, short) in pairwise(nodes):
         if np.linalg.norm(short) <= aim:
             by = short - long

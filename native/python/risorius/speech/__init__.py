@@ -38,10 +38,14 @@ def phonemes(
     """The phonemes of a sound file with their times, in order and without gaps; pauses are SIL.
 
     Args:
-        path, transcript, progress, cancel: see speak.
+        path: path of a WAV file, or of any file that an ffmpeg on PATH can read.
+        transcript: the spoken words in English, if known.
+        progress: called repeatedly with the fraction of the work done, 0 to 1.
+        cancel: called repeatedly; if it returns true, CancelledError is raised.
 
     Raises:
-        AudioError, MissingError, CancelledError: see speak.
+        AudioError: an unusable file. ValueError: a transcript without English words.
+        MissingError: PocketSphinx is not installed. CancelledError: cancel() returned true.
     """
     return listen(path, transcript, progress=progress, cancel=cancel).phonemes
 
@@ -77,10 +81,11 @@ def speak(
         cancel: called repeatedly; if it returns true, CancelledError is raised.
 
     Returns:
-        A clip of raw controls and head.pitch, from the beginning of the sound to 0.3 s after its
-        end. Values of its events "word" and "phoneme" are the word or phoneme. Metadata: source,
-        transcript, speech ("aligned" or "recognised"), notes about deviations; if correctable also
-        seconds (duration of the sound) and openness (integers, in thousandths).
+        A clip of raw controls and, with accents, of head.pitch (radians), from the beginning of
+        the sound to 0.3 s after its end. Values of its events "word" and "phoneme" are the word or
+        phoneme. Metadata: source, speech ("aligned" or "recognised"), transcript if given, notes
+        about deviations if there are any; if correctable also seconds (duration of the sound) and
+        openness (integers, in thousandths).
 
     Raises:
         AudioError: an unusable file. ValueError: a transcript without English words, a rate or an
@@ -113,8 +118,14 @@ def animate(
     """Makes the clip of a voice from its phonemes and samples.
 
     Args:
-        heard: from `listen`.
-        rate, seed, intensity, blinks, accents, correctable, library: see speak.
+        heard: phonemes and samples from `listen`.
+        rate: frames per second of the clip.
+        seed: seed of the blinks' times.
+        intensity: factor on mouth shapes, brows and nods, 0 to 4.
+        blinks: whether to add blinks.
+        accents: whether brows and head follow stressed syllables.
+        correctable: whether to add metadata with which `mouth` can recompute the curves.
+        library: expressions by name, whose visemes replace the built-in ones.
 
     Raises:
         ValueError: an invalid rate or intensity.
@@ -155,7 +166,8 @@ def mouth(
         opened: float[n], factor on the jaw of vowels every OPENNESS_STEP seconds: the result of
             prosody.openness, or the integers "openness" in a correctable clip's metadata / 1000.
         times: float64[frames], seconds, ascending in equal steps.
-        intensity, library: see speak.
+        intensity: factor on mouth shapes, 0 to 4.
+        library: expressions by name, whose visemes replace the built-in ones.
 
     Returns:
         Raw control -> float64[frames] in [0, 1].

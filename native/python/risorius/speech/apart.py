@@ -9,8 +9,8 @@ separate process avoids this, turns a crash into an error message, and can be ki
     sends the task as a line of JSON     -->     calls speak()
     reads the lines                      <--     sends lines of JSON: the fraction of the work done,
                                                  again and again; then the clip or an error
-    closes the pipe: by cancel(), or     -->     ends
-    because this process has ended
+    kills the process after cancel(),    -->     ends
+    or ends, which closes the pipe
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from .listening import Cancel, CancelledError, Progress
 from .recogniser import MissingError
 
 _PATIENCE = 3600.0  # seconds without a message until an error; a long voice is aligned in one step
-_ASKED = 0.05  # seconds between two calls of cancel
+_ASKED = 0.05  # seconds: longest time between two calls of cancel
 _BEGIN = (
     "import json, sys; task = json.loads(sys.stdin.buffer.readline()); sys.path[:] = task['paths'];"
     "from risorius.speech import apart; apart.serve(task)"
@@ -70,8 +70,12 @@ def speak_apart(
     """Does the work of speak in a separate process, which is killed if cancel() returns true.
 
     Args:
-        path, transcript, progress, cancel, options: see speak. progress and cancel are called from
-            the calling thread, which waits.
+        path: path of a sound file.
+        transcript: the spoken words in English, if known.
+        progress: called with the fraction of the work done, 0 to 1, from the calling thread, which
+            waits.
+        cancel: called repeatedly from the calling thread.
+        options: further keyword arguments of speak.
 
     Raises:
         RecogniserError: the process could not be started, or ended unexpectedly; errors of speak.
@@ -127,7 +131,7 @@ def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
         )
     except OSError as error:
         raise RecogniserError(
-            f"the recogniser's process could not be started: {python}: {error.strerror}"
+            f"the process of the speech recogniser could not be started: {python}: {error.strerror}"
         ) from error
 
 
@@ -144,7 +148,7 @@ def python_program() -> str:
         if name.startswith("python") and os.path.isfile(place):
             return place
     raise RecogniserError(
-        f"speech needs the program of Python to run beside this one: none was found in "
+        "speech recognition runs in a separate program of Python: none was found in "
         f"{sys.exec_prefix}"
     )
 
@@ -173,7 +177,8 @@ def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterat
         except queue.Empty:
             if monotonic() - heard > _PATIENCE:
                 raise RecogniserError(
-                    f"the recogniser said nothing for {_PATIENCE:g} s and was ended"
+                    f"the process of the speech recogniser said nothing for {_PATIENCE:g} s and "
+                    "was ended"
                 ) from None
             continue
         if not line:

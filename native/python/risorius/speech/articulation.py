@@ -54,8 +54,9 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
         times: float64[frames], seconds, ascending in equal steps.
 
     Returns:
-        float64[frames, 15] in the order of VISEMES. The visemes PP and FF have the weight of their
-        `gate`; the other visemes share the rest, so that each row sums to 1.
+        float64[frames, 15] in the order of VISEMES. PP has the weight of its `gate`, FF the weight
+        of its gate times the part that PP leaves; the other visemes share the rest, so that each
+        row sums to 1.
     """
     pull = np.zeros((len(times), len(VISEMES)))
     for begin, end, viseme in _targets(phonemes):
@@ -125,7 +126,12 @@ def gate(phonemes: Sequence[Phoneme], viseme: str, times: Times) -> Curves:
 
 
 def _smoothed(curves: Curves, times: Times) -> Curves:
-    """Smooths with a Gaussian over time, without delay; the first and last values are extended."""
+    """Smooths with a Gaussian over time, without delay; the first and last values are extended.
+
+    Args:
+        curves: float64[frames, n].
+        times: float64[frames], seconds, ascending in equal steps.
+    """
     step = float(times[1] - times[0]) if len(times) > 1 else 1.0
     reach = int(np.ceil(3.0 * _SMOOTHING / step))
     held = np.pad(curves, ((reach, reach), (0, 0)), mode="edge")
@@ -144,7 +150,7 @@ def controls(
     Args:
         weights: float64[frames, 15] from viseme_weights.
         openness: float64[frames], factor on the jaw of vowels; 1 at the voice's usual loudness.
-        intensity: factor on all shapes except closures.
+        intensity: factor on all shapes except PP and FF.
         library: a face's own visemes by name, which replace the built-in ones; in a vowel of the
             library, openness scales all controls, not only the jaw.
 
@@ -164,7 +170,7 @@ def controls(
 
 
 def _rounded_off(curve: Curves) -> Curves:
-    """Limits a curve to [0, 1] without a kink: values above _FREE approach 1."""
+    """Limits a curve to [0, 1] without a kink: values above _FREE (0.8) approach 1."""
     rest = 1.0 - _FREE
     over = _FREE + rest * np.tanh((curve - _FREE) / rest)
     return np.where(curve > _FREE, over, curve).clip(0.0, 1.0)

@@ -23,9 +23,10 @@ RATE = 16000
 
 _LOWEST_RATE, _HIGHEST_RATE = 4000, 768000
 _MOST_CHANNELS = 64
-_MOST_BYTES = 2**31  # limit of a file: three hours of stereo at 48 kHz and 32 bit
+_MOST_BYTES = 2**31  # limit of a file: 1.5 hours of stereo at 48 kHz and 32 bit
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
-_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # values in the size fields of programs that write to a pipe
+# Values in the size fields of a WAV file whose program wrote to a pipe and did not know the size.
+_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)
 
 
 class AudioError(RisoriusError):
@@ -83,7 +84,10 @@ class _OtherKindError(AudioError):
 
 
 def parse_wav(data: bytes) -> tuple[Samples, int]:
-    """Parses the bytes of a WAV file; returns the same as read_audio.
+    """Parses the bytes of a WAV file.
+
+    Returns:
+        float32[samples] of one channel, where full scale is 1, and the samples per second.
 
     Raises:
         AudioError: damaged, without samples, or of an unsupported format; the message does not name
@@ -123,7 +127,7 @@ def _format(chunk: bytes, offset: int) -> _Format:
         raise AudioError(f"byte {offset}: a fmt chunk of 16 bytes was expected, found {len(chunk)}")
     code, channels, rate, _, block, bits = struct.unpack_from("<HHIIHH", chunk)
     if code == _EXTENSIBLE and len(chunk) >= 26:
-        # the format code at the beginning of the sub-format's GUID
+        # The format code is at the beginning of the sub-format's GUID.
         code = struct.unpack_from("<H", chunk, 24)[0]
     if not 1 <= channels <= _MOST_CHANNELS:
         raise AudioError(
@@ -167,18 +171,26 @@ def _decode(body: bytes, form: _Format) -> Samples:
 
 
 def _one_channel(channels: Samples) -> Samples:
-    """Converts float32[samples, channels] to float32[samples]."""
+    """float32[samples]: the mean of float32[samples, channels], or the loudest channel if the mean
+    loses the voice."""
     mean = channels.mean(axis=1, dtype=np.float32)
     power = np.square(channels, dtype=np.float64).mean(axis=0)
-    # If microphones have opposite polarity, the mean of the channels loses the voice, so the
-    # loudest channel is used.
+    # Channels of microphones with opposite polarity cancel out in the mean.
     if np.square(mean, dtype=np.float64).mean() < 0.05 * power.max():
         return np.ascontiguousarray(channels[:, int(np.argmax(power))])
     return mean
 
 
 def _converted(path: str | os.PathLike[str], found: str) -> bytes:
-    """Converts a sound file with ffmpeg to the bytes of a WAV file."""
+    """Converts a sound file with ffmpeg to the bytes of a WAV file: one channel at RATE.
+
+    Args:
+        path: path of the file.
+        found: the reason why ffmpeg is needed, for errors.
+
+    Raises:
+        AudioError: not a regular file, no ffmpeg on PATH, or no sound in the file.
+    """
     # ffmpeg gets only files: a pipe has been read already, and ffmpeg would wait for ever.
     if not os.path.isfile(path):
         raise AudioError(f"{path}: {found}; other formats are read from files, and not from pipes")
@@ -208,6 +220,7 @@ def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
 
     Args:
         samples: float32[n] at `source` samples per second.
+        source, target: samples per second before and after the conversion.
 
     Returns:
         float32[n * target / source], rounded up; sample i is at i / target seconds.
@@ -217,7 +230,7 @@ def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
     divisor = int(np.gcd(source, target))
     up, down = target // divisor, source // divisor
     count = -(-len(samples) * up // down)
-    band = 0.955 * min(1.0, target / source)  # as a fraction of the source's band
+    band = 0.955 * min(1.0, target / source)  # highest frequency / (source / 2)
     reach = int(np.ceil(56.0 / band))  # samples of the source on each side of the filter
     padded = np.concatenate([np.zeros(reach, np.float32), samples, np.zeros(reach + 1, np.float32)])
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
@@ -233,7 +246,13 @@ def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
 
 
 def _kernel(fractions: npt.NDArray[np.float64], reach: int, band: float) -> Samples:
-    """float32[fractions, 2 * reach + 1]: filter weights of the samples around each position."""
+    """float32[fractions, 2 * reach + 1]: filter weights of the samples around each position.
+
+    Args:
+        fractions: float64[n], distance of each position from the sample before it, 0 to 1.
+        reach: number of samples on each side.
+        band: highest frequency that passes, as a fraction of half the samples per second.
+    """
     distance = np.arange(-reach, reach + 1) - fractions[:, None]
     inside = np.clip(1.0 - np.square(distance / (reach + 1.0)), 0.0, None)
     window = np.i0(8.0 * np.sqrt(inside)) / np.i0(8.0)

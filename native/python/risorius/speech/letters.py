@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Guesses the pronunciation of words that no dictionary has, by letter-to-sound rules for English.
 
-It need not be correct as speech, only as mouth movement: with an approximate pronunciation the
-aligner still finds the times.
+The pronunciation need not be correct as speech, only as mouth movement: with an approximate
+pronunciation the aligner still finds the times.
 """
 
 from __future__ import annotations

@@ -23,7 +23,8 @@ STEP = 0.01
 """Seconds between two values of a loudness curve."""
 
 _PIECE = 12.0  # seconds: smallest length of a piece, if pauses allow it
-_LONGEST_PIECE = 30.0  # seconds; limits the memory of the decoder
+# Seconds: longest piece of `pieces`, to limit the decoder's memory; aligned pieces may be longer.
+_LONGEST_PIECE = 30.0
 _PAUSE = 0.15  # seconds: shortest silence in which the voice may be cut
 _SHORTEST_SILENCE = 0.08  # seconds: shorter silences are not removed from phonemes
 _SHORTEST_PHONEME = 0.03  # seconds: shortest length of a phoneme
@@ -54,7 +55,8 @@ class Heard(NamedTuple):
     samples: Samples
     """float32[n] at audio.RATE samples per second."""
     aligned: bool
-    """Whether the phonemes were aligned from the transcript, and not recognised."""
+    """True: the phonemes come from the transcript, or were given to `follow`; gaps and pieces that
+    cannot be aligned are recognised nevertheless. False: all are recognised, or nobody speaks."""
     notes: list[str]
     """Sentences about deviations, such as words of the transcript that were not heard."""
 
@@ -69,7 +71,7 @@ def listen(
     """Finds the phonemes of a sound file.
 
     Args:
-        path: see audio.read_audio.
+        path: path of a WAV file, or of any file that an ffmpeg on PATH can read.
         transcript: the spoken words in English, if known.
         progress: called repeatedly with the fraction of the work done, 0 to 1.
         cancel: called repeatedly; if it returns true, the work ends.
@@ -114,11 +116,12 @@ def follow(path: str | os.PathLike[str], found: Sequence[Phoneme]) -> Heard:
     """Combines a sound file with known phonemes; PocketSphinx is not needed.
 
     Args:
-        path: see audio.read_audio.
+        path: path of a WAV file, or of any file that an ffmpeg on PATH can read.
         found: phonemes in order; gaps become silence.
 
     Raises:
-        AudioError: an unusable file. ArgumentError: a phoneme begins after the end of the sound.
+        AudioError: an unusable file. ArgumentError: a phoneme other than silence begins after the
+            end of the sound.
     """
     samples = resample(*read_audio(path))
     duration = len(samples) / RATE
@@ -145,7 +148,18 @@ def _reporter(progress: Progress | None, cancel: Cancel | None) -> Progress:
 def _aligned(
     recogniser: Recogniser, samples: Samples, words: Sequence[str], tell: Progress, notes: list[str]
 ) -> list[Phoneme] | None:
-    """The transcript's phonemes with times, or None if too few of its words are heard."""
+    """The transcript's phonemes with times, or None if too few of its words are heard.
+
+    Phonemes are recognised in pieces where the alignment of phonemes fails and, if the words of
+    the transcript do not match the voice exactly, in the gaps between the words that are heard.
+
+    Args:
+        recogniser: decoders.
+        samples: float32[n], the whole voice at RATE samples per second.
+        words: words of the transcript.
+        tell: called with the fraction of the work done, 0 to 1.
+        notes: gets a sentence if some words are not heard.
+    """
     duration = len(samples) / RATE
     segments = recogniser.align_words(samples, words)
     if segments is not None:
@@ -167,9 +181,15 @@ def _aligned(
 def _piece(
     recogniser: Recogniser, samples: Samples, begin: float, end: float, said: Sequence[str]
 ) -> list[Phoneme]:
-    """The phonemes of a piece of the voice, in times of the whole sound.
+    """The phonemes from `begin` to `end` seconds of the voice, in times of the whole sound.
 
     The words `said` are aligned; if this fails or there are none, phonemes are recognised.
+
+    Args:
+        recogniser: decoders.
+        samples: float32[n], the whole voice at RATE samples per second.
+        begin, end: first and last second of the piece.
+        said: words of the piece.
     """
     piece = samples[int(begin * RATE) : int(end * RATE)]
     phones = recogniser.align_phonemes(piece, said) if said else None
@@ -179,14 +199,25 @@ def _piece(
 
 
 def _shifted(found: Sequence[Phoneme], begin: float, end: float) -> list[Phoneme]:
-    """Converts times in a piece that begins at `begin` to times in the whole sound."""
+    """Converts times in a piece from `begin` to `end` seconds to times in the whole sound, at most
+    `end`.
+
+    Args:
+        found: phonemes with times in the piece.
+        begin, end: first and last second of the piece.
+    """
     return [p._replace(begin=p.begin + begin, end=min(p.end + begin, end)) for p in found]
 
 
 def _loose_pieces(
     segments: Sequence[Segment], duration: float
 ) -> list[tuple[float, float, list[str]]]:
-    """(begin, end, words) of each piece: runs of adjacent words, and gaps without words."""
+    """(begin, end, words) of each piece: runs of adjacent words, and gaps without words.
+
+    Args:
+        segments: the words that were heard, with times.
+        duration: duration of the voice in seconds.
+    """
     parts: list[tuple[float, float, list[str]]] = []
     for segment in segments:
         last = parts[-1][1] if parts else 0.0
@@ -209,7 +240,12 @@ def confidence(found: Sequence[Phoneme]) -> float:
 
 
 def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[str]:
-    """Sentences for the user if the transcript seems not to belong to this voice."""
+    """Sentences for the user if the transcript seems not to belong to this voice.
+
+    Args:
+        found: aligned phonemes.
+        levels: float64[n], loudness in decibels every STEP seconds.
+    """
     notes = []
     if confidence(found) < _DOUBTFUL:
         notes.append("the transcript fits the voice badly: does it belong to another recording?")
@@ -228,7 +264,14 @@ def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[s
 def _word_pieces(
     segments: Sequence[Segment], duration: float
 ) -> Iterator[tuple[float, float, list[str]]]:
-    """(begin, end, words) of each piece; pieces are cut in pauses and cover the whole duration."""
+    """(begin, end, words) of each piece, in seconds; pieces are cut in the middle of pauses.
+
+    They cover the whole duration, or end in the middle of the last pause if no word follows it.
+
+    Args:
+        segments: all words with times, and silences between them.
+        duration: duration of the voice in seconds.
+    """
     begin = 0.0
     said: list[str] = []
     for segment in segments:
@@ -330,7 +373,13 @@ def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> 
 
 
 def _is_closure(phones: Sequence[Phoneme], last: int, begin: float) -> bool:
-    """Whether a silence that starts at `begin` is the closure of a stop consonant inside a word."""
+    """Whether a silence that starts at `begin` is the closure of a stop consonant inside a word.
+
+    Args:
+        phones: phonemes in order.
+        last: index of the last phoneme that overlaps the silence.
+        begin: start of the silence in seconds.
+    """
     phone = phones[last]
     return phone.name in _STOPS and not phone.word and phone.begin > begin - 0.05
 

@@ -54,8 +54,8 @@ def pitch(samples: Samples) -> Curve:
         block = (block - block.mean(axis=1, keepdims=True)) * shape
         power = np.fft.irfft(np.square(np.abs(np.fft.rfft(block, size))))
         score = power[:, lags] / np.maximum(power[:, :1], 1e-9) * (own[0] / own[lags])
-        # The small penalty selects the first of equal peaks. It is the period; later peaks are its
-        # multiples.
+        # The small penalty selects the first of equal peaks. The first peak is at the period of the
+        # voice; later peaks are at multiples of the period.
         best = np.argmax(score - 0.002 * lags, axis=1)
         voiced = (score[np.arange(len(block)), best] > _VOICED) & (power[:, 0] > 1e-6)
         heights = 12.0 * np.log2(_PITCH_RATE / lags[best] / 100.0)
@@ -96,6 +96,8 @@ def openness_at(opened: Curve, times: Curve) -> Curve:
 def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -> list[Accent]:
     """Finds vowels that are louder, higher or longer than the other vowels of the voice.
 
+    A voice of fewer than three vowels has no accents.
+
     Args:
         phonemes: phonemes of the voice, in order.
         samples: samples of the voice at RATE per second.
@@ -123,7 +125,13 @@ def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -
 
 
 def _measure(phone: Phoneme, levels: Curve, heights: Curve) -> tuple[float, float, float]:
-    """(loudness in dB, pitch in semitones or NaN, duration in seconds up to 0.3) of a vowel."""
+    """(loudness in dB, pitch in semitones or NaN, duration in seconds up to 0.3) of a vowel.
+
+    Args:
+        phone: the vowel.
+        levels: float64[n], loudness in decibels every STEP seconds.
+        heights: float64[n], pitch in semitones every STEP seconds, or NaN.
+    """
     first = min(int(phone.begin / STEP), len(levels) - 1)
     last = max(first + 1, int(phone.end / STEP))
     voiced = heights[first:last][np.isfinite(heights[first:last])]

@@ -30,8 +30,8 @@ _LAG = 0.0128  # seconds from the beginning of a frame to the middle of its 25.6
 # other speech precedes it.
 _SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01
 _PHONE_OPTIONS: dict[str, Any] = {"beam": 1e-20, "pbeam": 1e-20, "lw": 1.0}
-# A single quick pass with narrow beams, because the vote of three quick decodings is better than
-# one thorough decoding.
+# Words are decoded in a single quick pass with narrow beams, because the vote of three quick
+# decodings is better than one thorough decoding.
 _WORD_OPTIONS: dict[str, Any] = {"fwdflat": False, "maxhmmpf": 3000, "beam": 1e-40, "wbeam": 1e-20}
 # Options that are tried in turn, because on the best path through the word lattice the alignment of
 # phonemes sometimes does not reach the end of the sound.
@@ -141,7 +141,12 @@ class Recogniser:
         return found if [s.word for s in found if s.word] == list(words) else None
 
     def hear_words(self, samples: Samples) -> list[Segment] | None:
-        """The phonemes of the most likely English words; None if no words are recognised."""
+        """The phonemes of the most likely English words; None if no words are recognised, or their
+        phonemes cannot be timed.
+
+        Args:
+            samples: samples of a piece of a voice at RATE per second.
+        """
         decoder = self._decoder("words")
         decoder.activate_search()
         _decode(decoder, _pcm(samples))

@@ -96,14 +96,17 @@ def textgrid(found: Sequence[Phoneme]) -> str:
 
 
 def read(data: bytes, name: str) -> list[Phoneme]:
-    """Reads the phonemes of a file in either format, in order; gaps are silence.
+    """Reads the phonemes of a file in either format, in order; gaps between them mean silence.
+
+    The confidence of each phoneme is 1, because a column of confidences is not read.
 
     Args:
         data: content of the file in UTF-8, or in UTF-16 with a byte order mark.
         name: the file's name in errors.
 
     Raises:
-        SheetError: another format, times that do not ascend, an unknown phoneme.
+        SheetError: another format or encoding, times that do not ascend, an unknown phoneme, or no
+            phoneme but silence.
     """
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
@@ -186,8 +189,11 @@ def _from_textgrid(text: str, name: str) -> list[Phoneme]:
 
 
 def _tiers(text: str, name: str) -> dict[str, list[_Interval]]:
-    """Name -> intervals of each interval tier. Like Praat, it reads only free-standing numbers,
-    strings and flags. So Praat's long and short text formats need no different treatment."""
+    """Name -> intervals of each interval tier; tiers of points are skipped.
+
+    Only free-standing numbers and strings are read, like in Praat. So Praat's long and short text
+    formats need no different treatment.
+    """
     tokens = _Tokens(text, name)
     tokens.string()  # ooTextFile
     tokens.string()  # TextGrid

@@ -75,7 +75,10 @@ def cardinal(number: int) -> list[str]:
 
 
 def _year(digits: str) -> list[str]:
-    """Four digits as a year (nineteen eighty four), other digits as a number."""
+    """1100 to 2099 as a year (nineteen eighty four), but 2000 to 2009 as a number like all others.
+
+    Digits that begin with 0 are read one by one.
+    """
     if digits.startswith("0") and len(digits) > 1:
         return [_SMALL[int(digit)] for digit in digits]
     number = int(digits)

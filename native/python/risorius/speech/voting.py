@@ -22,7 +22,7 @@ Votes = npt.NDArray[np.float64]
 
 _SPEEDS = (0.95, 1.0, 1.05)
 _WORD_VOTE, _PHONE_VOTE = 1.2, 1.0
-_MAJORITY = 0.01  # additional vote at the voice's own speed, to break ties
+_MAJORITY = 0.01  # additional vote of the decoder of phonemes at speed 1, to break ties
 _SHORTEST = 3  # smallest number of frames of a phoneme
 
 _PHONES = tuple(CLASS_OF)
@@ -59,7 +59,11 @@ def _count(votes: Votes, heard: Sequence[Segment], speed: float, weight: float) 
 
 
 def _elected(votes: Votes) -> list[Phoneme]:
-    """Elects the viseme of each frame, then a phoneme for each run of frames with one viseme."""
+    """Elects the viseme of each frame, then a phoneme for each run of frames with one viseme.
+
+    Args:
+        votes: float64[frames, phonemes], votes for each phoneme in each frame of FRAME seconds.
+    """
     visemes = np.zeros((len(votes), len(VISEMES)))
     for column, viseme in enumerate(_VISEME_OF_COLUMN):
         visemes[:, viseme] += votes[:, column]
@@ -78,7 +82,13 @@ def _elected(votes: Votes) -> list[Phoneme]:
 
 
 def _runs(best: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
-    """(first frame, last frame + 1) of each run of a viseme; short runs join the run before."""
+    """(first frame, last frame + 1) of each run of frames with one viseme.
+
+    A run of fewer than 3 frames joins the run before it.
+
+    Args:
+        best: int[frames], index of the viseme of each frame.
+    """
     edges = [0, *(int(i) + 1 for i in np.flatnonzero(np.diff(best))), len(best)]
     runs: list[tuple[int, int]] = []
     for first, last in pairwise(edges):
@@ -90,7 +100,14 @@ def _runs(best: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
 
 
 def _with_words(found: list[Phoneme], words: Sequence[Segment]) -> list[Phoneme]:
-    """Sets each word at the phoneme that begins nearest to it, at most one word per phoneme."""
+    """Sets each word at the phoneme that begins nearest to it.
+
+    A word is dropped if an earlier word of the list is at this phoneme, or if all is silence.
+
+    Args:
+        found: phonemes; changed.
+        words: the words with their times.
+    """
     spoken = [i for i, phone in enumerate(found) if phone.name != "SIL"]
     if not spoken:
         return found

@@ -102,7 +102,15 @@ def _steps(
     about: dict[str, Any], name: str, values: npt.ArrayLike, most: float, streams: _Streams
 ) -> None:
     """Appends values as integer multiples of a step up to `most`, axis by axis; `about` gets the
-    step and the layout."""
+    step and the layout.
+
+    Args:
+        about: table of the mesh; changed.
+        name: key in `about`.
+        values: float[n, k].
+        most: largest step.
+        streams: receives the numbers.
+    """
     exact = np.asarray(values, np.float64)
     step = _step(exact, most)
     about[name] = [step, *streams.add(np.rint(exact.T / step))]

@@ -102,7 +102,13 @@ class _Finder:
         return material
 
     def _picture(self, name: str, role: str, kind: str = "") -> dict[str, int]:
-        """Role -> number of a picture; a colour picture with opacity is split into two pictures."""
+        """Role -> number of a picture; a colour picture with opacity is split into two pictures.
+
+        Args:
+            name: file name of the picture.
+            role: role of the picture, such as color.
+            kind: kind of the mesh, such as hair.
+        """
         if (name, role) in self.numbers:
             return self.numbers[name, role]
         data = self.textures.read(name)
@@ -124,8 +130,11 @@ class _Finder:
     def _wrinkles(self, named: dict[str, str]) -> dict[str, Any]:
         """The table of a material's wrinkles: numbers of the normal maps, and one picture of masks.
 
-        Its list `maps` contains [animated map, tile in the picture of masks, index of the normal
-        map or _FLUSH].
+        The list `maps` in the table contains [animated map, tile in the picture of masks, index of
+        the normal map or _FLUSH].
+
+        Args:
+            named: role of a picture of this material -> file name.
         """
         sets, offsets, maps = dict[int, int](), list[int](), list[list[int]]()
         tiles = list[Pixels]()

@@ -123,14 +123,20 @@ def render_script(
     `<script src="face.js"></script>` and `<risorius-face></risorius-face>` show it.
 
     Args:
-        dna, looks, clip, sound: see render.
+        dna: face with behavior and geometry.
+        looks: materials and pictures from find_looks; None: plain materials by the meshes' names.
+        clip: clip to play, with raw controls and angles of neck and head.
+        sound: sound of the clip: bytes of a file, its suffix (one of SOUNDS), and the second of the
+            clip at which it starts.
         name: name by which `<risorius-face name="...">` finds the face; the first face needs none.
 
     Returns:
         JavaScript as ASCII bytes.
 
     Raises:
-        WebError: see render.
+        WebError: the face has no meshes, the clip moves nothing, or the page in this build is
+            missing or outdated.
+        DnaError: the face cannot be written.
     """
     page = empty_page()
     viewer, boot = dict(_ELEMENT.findall(page)), _BOOT.search(page)
@@ -222,8 +228,8 @@ def _captures(names: list[str]) -> dict[str, Any]:
 def _bones(dna: Dna) -> list[dict[str, Any]]:
     """A table for each joint that rotates with the neck or head.
 
-    It contains the joint's share of the neck's or head's angles, the joint's axes about which they
-    rotate it, and the raw controls of its rotation.
+    The table contains the joint's fraction of the neck's or head's rotation, the matrix (9 numbers)
+    from the face's axes to the joint's axes, and the raw controls of the joint's rotation.
     """
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     return [
@@ -273,8 +279,8 @@ def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes
 def _turns(given: dict[str, Any], dna: Dna) -> dict[int, Any]:
     """Joint -> float64[frames, 4], its rotation from the rest pose as a quaternion x, y, z, w.
 
-    The rotation comes from the joint's raw controls if the clip moves them, else from the angles of
-    neck or head.
+    The rotation comes from the joint's four raw controls if the clip has all of them, else from the
+    angles of neck or head. Joints of which the clip has neither are left out.
     """
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     raw = dna.raw_control_names
@@ -297,6 +303,9 @@ def _sound(sound: Sound | None) -> dict[str, Any] | None:
         return None
     data, ending, offset = sound
     if ending.lower() not in _SOUNDS:
-        raise WebError(f"a sound ending in {' or '.join(SOUNDS)} was expected, found {ending!r}")
+        raise WebError(
+            f"a sound file with a name ending in {' or '.join(SOUNDS)} was expected, found "
+            f"{ending!r}"
+        )
     url = f"data:{_SOUNDS[ending.lower()]};base64,{base64.b64encode(data).decode()}"
     return {"url": url, "offset": offset}

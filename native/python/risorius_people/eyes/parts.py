@@ -27,7 +27,7 @@ _MOUND = (
     (4, 2.25, 0.04),
     (4, 2.7, -0.15),
 )
-_APART = 0.12  # share of the neighbouring column at the corner
+_APART = 0.12  # weight of the neighbouring column in the caruncle's vertices at the eye's corner
 Row = dict[int, float]  # vertex of the base mesh -> weight; the weights of a row sum to 1
 
 
@@ -96,7 +96,8 @@ def _on_skin(rings: Ints, row: int, column: int) -> Row:
     """Weights of the base mesh's vertices for a lid vertex after the subdivision of LOD 0.
 
     Args:
-        rings: int64[13, COLUMNS], the rings of the eye, see find_rings.
+        rings: int64[13, COLUMNS], vertices of the rings of skin around the eye, from the cheek and
+            brow inward.
         row: row of the grid, neither the first nor the last.
         column: column of the grid.
     """
@@ -113,7 +114,8 @@ def _rim(rings: Ints, at: float, column: int) -> Row:
     """Weights of the base mesh's vertices for a point on a lid's rim.
 
     Args:
-        rings: int64[13, COLUMNS], the rings of the eye, see find_rings.
+        rings: int64[13, COLUMNS], vertices of the rings of skin around the eye, from the cheek and
+            brow inward.
         at: position across the rim: 0 at the lashes' roots, 2 to 3 where the rim meets the eye.
         column: column of the grid.
     """
@@ -126,7 +128,8 @@ def _tears(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
     """Makes the tear line between lower lid and eye: a hollow strip from the rim to the ball.
 
     Args:
-        rings: int64[13, COLUMNS], the rings of the eye, see find_rings.
+        rings: int64[13, COLUMNS], vertices of the rings of skin around the eye, from the cheek and
+            brow inward.
 
     Returns:
         Vertices as weights of the base mesh's vertices, faces, and texture coordinates
@@ -156,10 +159,12 @@ def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
     """Makes the caruncle, the pink flesh in the inner corner: a mound between the rims.
 
     Args:
-        rings: int64[13, COLUMNS], the rings of the eye, see find_rings.
+        rings: int64[13, COLUMNS], vertices of the rings of skin around the eye, from the cheek and
+            brow inward.
 
     Returns:
-        Vertices, faces and texture coordinates, as from _tears.
+        Vertices as weights of the base mesh's vertices, faces, and texture coordinates
+        float64[vertices, 2].
     """
     rows: list[Row] = []
     for aside, at, high in _MOUND:
@@ -176,7 +181,12 @@ def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
 
 
 def _strip(rows: list[Row], across: int) -> tuple[list[Row], list[list[int]], Floats]:
-    """Adds quads between rows of `across` vertices each, counter-clockwise from the front."""
+    """Adds quads between rows of `across` vertices each, counter-clockwise from the front, and
+    texture coordinates from 0 to 1.
+
+    Returns:
+        The rows unchanged, faces, and texture coordinates float64[vertices, 2].
+    """
     length = len(rows) // across
     faces = []
     for k in range(length - 1):

@@ -125,7 +125,13 @@ class Eyes:
         return correctives
 
     def _looks(self, eye: Lids, units: Units, letter: str) -> None:
-        """Makes a look rotate the eyeball about its middle; lids follow more than in the data."""
+        """Makes a look rotate the eyeball about its middle; lids follow more than in the data.
+
+        Args:
+            eye: lids of the eye.
+            units: raw control -> float64[V, 3]; the looks of this eye are changed.
+            letter: "L" or "R".
+        """
         names = ("helper-{}-eye", "eyeball-{}", "cornea-{}")
         own = np.concatenate([self._groups[name.format(eye.side)] for name in names])
         for way in lids.LOOKS:

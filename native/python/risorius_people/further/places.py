@@ -14,7 +14,9 @@ from ..source import BaseMesh
 
 MM = 0.01  # decimetres per millimetre
 _TOUCHING = 0.03  # decimetres: largest distance of a lip vertex from the other lip
-_PARTED = 0.04  # decimetres: smallest distance that the opening jaw adds
+# decimetres: smallest difference between the displacements of two touching lip vertices if the jaw
+# opens
+_PARTED = 0.04
 _BETWEEN = 0.03  # decimetres: width of the blend between the lips at the corners
 _LID = 0.035  # decimetres: reach of a lid's skin from the roots of its lashes
 _CHUNK = 256  # points whose distances are computed together
@@ -60,7 +62,8 @@ class Places:
         normals: float64[V, 3], unit normals.
         groups: name of a group of the base mesh -> vertex indices.
         skin: float64[V], 1 for vertices of the body's skin, else 0.
-        lips: "U" or "D" -> float64[V], weight of the upper or lower lip.
+        lips: "U" or "D" -> float64[V], 1 for all vertices above or below the line between the lips,
+            with a soft edge; the sum is 1.
         along: float64[V], 0 in the middle of the lips, 1 and -1 at their corners.
         lip_distance: float64[V], distance from the line along which the lips touch.
         lids: "U" or "D" -> float64[V], weight of the upper or lower lids of both eyes, with lashes.
@@ -129,10 +132,10 @@ def find_places(
 
 
 def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
-    """Vertices of one lip that touch the other lip.
+    """int64[n]: vertices of each lip at which it touches the other lip.
 
-    Near such a vertex is a vertex of the other lip. The opening jaw parts both vertices, and no
-    face has both.
+    Within _TOUCHING of such a vertex is a vertex of the other lip. The opening jaw parts both
+    vertices, and no face has both.
 
     Args:
         positions: float64[V, 3], in decimetres.

@@ -40,7 +40,8 @@ def head_of(dna: Dna, lod: int) -> Mesh | None:
 
 
 def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
-    """int64[T, 3], vertices of triangles; int64[V, n], numbers of the triangles at each vertex."""
+    """int64[T, 3], vertices of the triangles into which a mesh's polygons are split; int64[V, n],
+    indices of the triangles at each vertex, where a short row repeats its last one."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
     sizes = np.diff(offsets)
@@ -120,8 +121,12 @@ class Turning:
     """Rotates cards where a blend shape tilts the skin.
 
     A joint rotates the cards by itself, but a blend shape only shifts their roots: without this
-    rotation the beard on a lip that rolls in would be inside the skin. See bind for the arguments
-    of the constructor.
+    rotation the beard on a lip that rolls in would be inside the skin.
+
+    Args:
+        head: the mesh of the skin.
+        places: place on the skin for each vertex of the cards.
+        mesh: the cards.
     """
 
     def __init__(self, head: Mesh, places: Roots, mesh: Mesh) -> None:
@@ -140,7 +145,11 @@ class Turning:
         self._normals = self._normals_at(self._skin)
 
     def _normals_at(self, skin: Floats) -> Floats:
-        """float64[n, 3]: unit normals of the skin at the cards' places."""
+        """float64[n, 3]: for each vertex of the cards, the unit normal at its place on the skin.
+
+        Args:
+            skin: float64[V, 3], positions of the skin's vertices.
+        """
         a, b, c = (skin[self._triangles[:, k]] for k in range(3))
         faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
         sums = [np.bincount(self._rows, faces[:, k], self._count + 1) for k in range(3)]
@@ -226,7 +235,17 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: whether all controls and neck joints move a place by less than `least`."""
+    """bool[n]: whether a place stays still relative to the head joint.
+
+    A place does if all controls except those of head and neck move it by less than `least`, and if
+    its weights of joints other than the head joint and its descendants are negligible.
+
+    Args:
+        dna: the face.
+        head: the mesh of the skin.
+        places: the places on the skin.
+        least: length in the unit of the mesh.
+    """
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]

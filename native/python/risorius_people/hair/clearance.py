@@ -26,7 +26,9 @@ from .surface import Roots, Surface, about, nearest_places, nearest_rows
 
 _NEAR = 0.3  # decimetres: skin further than this from every hair is ignored
 _SOME = 256  # number of hair points that determine which skin is near
-_LOW = 0.002  # decimetres: smallest height of an end above the skin, or its neutral height
+# decimetres: smallest allowed height of a hair's edges above the skin, except at the root; edges
+# that are lower in the neutral pose may be as low in other poses
+_LOW = 0.002
 _DEEPER = 0.002  # decimetres by which a root in the skin may be deeper than in the neutral pose
 # decimetres: a control that moves no skin farther than this cannot bring a hair into the skin
 _STILL = 0.002
@@ -57,7 +59,12 @@ def narrow_edges(strips: Strips, surface: Surface) -> None:
 
 
 def _depths(points: Floats, surface: Surface) -> Floats:
-    """float64[...]: depth of points below the nearest skin. Args: points: float64[..., 3]."""
+    """float64[...]: depth of points below the nearest skin, negative above the skin.
+
+    Args:
+        points: float64[..., 3], in decimetres.
+        surface: the head with the skin.
+    """
     flat = points.reshape(-1, 3)
     places = surface.nearest(flat)
     normals = unit_vectors(places.of(surface.normals))
@@ -68,7 +75,7 @@ def _depths(points: Floats, surface: Surface) -> Floats:
 def cut_clear(
     strips: Strips, dna: Dna, head: Mesh, unit: float, faces: Iterable[NDArray[np.float32]]
 ) -> Strips:
-    """Shortens or drops hairs that would go through the skin, and returns the others.
+    """Shortens or drops hairs that would go through the skin; returns all hairs that remain.
 
     Args:
         strips: hair in decimetres, of which only the roots follow the skin; changed.
@@ -195,7 +202,8 @@ class _Posed:
     def _carried(self, strips: Strips) -> Floats:
         """float64[n, rows, 2, 3]: positions of the left and right edges in the pose.
 
-        They move as the cards that binding.py binds to the skin.
+        The edges move like cards that follow their roots: with the joints of the skin there, and
+        rotated if a blend shape tilts the skin.
         """
         ground = self._ground
         roots = ground.roots(strips)
@@ -214,8 +222,8 @@ class _Posed:
     def rough(self, strips: Strips) -> Floats:
         """float64[n, rows]: approximate heights of the guides above the skin.
 
-        They are measured from the tangent plane of the nearest vertex. Only every fourth vertex is
-        considered.
+        The heights are measured from the tangent plane of the nearest vertex. Only every fourth
+        vertex is considered.
         """
         points = self._carried(strips).mean(axis=2).reshape(-1, 3)
         some = slice(None, None, _ROUGHLY)
@@ -243,7 +251,12 @@ class _Cutting:
         self.stays = np.ones(len(strips), bool)
 
     def cut(self, pose: _Posed, some: Ints) -> None:
-        """Shortens or drops the hairs `some` that come too near to the skin in a pose."""
+        """Shortens or drops the hairs `some` that come too near to the skin in a pose.
+
+        Args:
+            pose: the skin in the pose.
+            some: indices of hairs.
+        """
         strips = self._strips
         for _ in range(_CUTS):
             some = some[_deep(pose.heights(strips.taken(some)), self._rest[some])]
@@ -257,14 +270,25 @@ class _Cutting:
 
 
 def _deep(heights: Floats, rest: Floats) -> NDArray[np.bool_]:
-    """bool[n]: whether a hair comes too near to the skin, and nearer than in the neutral pose."""
+    """bool[n]: whether a hair comes too near to the skin, and nearer than in the neutral pose.
+
+    Args:
+        heights: float64[n, rows, 2], heights of the hairs' edges above the skin in a pose.
+        rest: float64[n, rows, 2], the heights in the neutral pose.
+    """
     lower = heights - np.minimum(rest, _LOW)
     ends, roots = lower[:, 1:].min(axis=(1, 2)), lower[:, 0].min(axis=1)
     return np.asarray((ends < -1e-4) | (roots < -_DEEPER))
 
 
 def _nearest(points: Floats, others: Floats) -> Ints:
-    """Does the same as nearest_rows in half the time, with float32, whose rounding errors are about
-    a micrometre."""
+    """int64[n]: index of the point of `others` nearest to each point.
+
+    The search uses float32, which halves the time; the rounding errors are about a micrometre.
+
+    Args:
+        points: float64[n, 3], in decimetres.
+        others: float64[m, 3], in decimetres.
+    """
     middle = others.mean(axis=0)
     return nearest_rows((points - middle).astype(np.float32), (others - middle).astype(np.float32))

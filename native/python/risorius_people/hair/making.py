@@ -31,9 +31,9 @@ from .surface import Surface
 PICTURE = "hair_color.png"
 NO_HAIR = 4  # number of the first LOD without hair cards
 _SHARES = (1.0, 0.42, 0.2, 0.1)  # fraction of the strips that is kept at each LOD
-# Fraction of the brows' strips that is kept at LODs 0 to 3. It is larger than for other hair,
-# because fewer cards must be wider, and wide cards look like dashes while the face is large on the
-# screen.
+# Fraction of the brows' strips that is kept at LODs 0 to 3. The fraction is larger than for other
+# hair, because fewer cards must be wider, and wide cards look like dashes while the face is large
+# on the screen.
 _BROWS = (1.0, 0.75, 0.3, 0.1)
 _MOST_VERTICES = 12_000  # limit for all cards at LOD 0 together
 _OWN = ("hair", "beard")  # meshes that not all people have
@@ -98,7 +98,12 @@ def _beard(surface: Surface, head: Part, person: Person) -> Strips:
 
 
 def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
-    """Replaces the scalp's cards by fewer and wider ones if all cards have too many vertices."""
+    """Replaces the scalp's cards by fewer and wider ones if all cards together have more than
+    _MOST_VERTICES vertices.
+
+    Args:
+        strips: mesh -> its strips at LOD 0.
+    """
     counts = {name: 2 * len(s) * s.rows for name, s in strips.items()}
     over = sum(counts.values()) - _MOST_VERTICES
     if over > 0 and "hair" in strips:
@@ -158,7 +163,7 @@ def hair_picture(person: Person, largest: int) -> dict[str, bytes]:
 
     Args:
         person: the person, with the hair colours.
-        largest: largest number of texels, as the side of a square.
+        largest: a texture has at most as many texels as a square with this side.
     """
     return {PICTURE: png(shrunk(paint_strands(person), largest))}
 

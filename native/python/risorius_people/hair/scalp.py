@@ -56,8 +56,15 @@ def _roots(
 ) -> tuple[Roots, Floats]:
     """Roots behind an uneven hairline, and float64[n], their distances from it in decimetres.
 
-    Short hair (`even` False) is denser where it lies flat, and sparser where it stands up. Long
-    hair is denser at the hairline and, with `fine` 1, at a parting.
+    Args:
+        surface: surface of the head.
+        spacing: smallest distance between two roots at density 1, in decimetres.
+        random: generator of the roots.
+        style: hair style, a key of HAIRLINES.
+        even: False for short hair, which is denser where it lies flat, and sparser where it stands
+            up.
+        fine: above 0, hair is denser at the hairline than behind it; with 1 it is as dense at a
+            parting.
     """
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[style])
@@ -86,7 +93,13 @@ def _roots(
 
 
 def _tiles(inside: Floats, random: np.random.Generator, edge: float = 0.07) -> Floats:
-    """Atlas tiles of strips: thin at the hairline and at random places, dense elsewhere."""
+    """int64[n]: atlas tiles of strips: thin at the hairline and at random places, dense elsewhere.
+
+    Args:
+        inside: float64[n], distance of each root from the hairline in decimetres.
+        random: generator of the tiles.
+        edge: distance from the hairline in decimetres up to which tiles are thin.
+    """
     n = len(inside)
     thin = (inside < edge * random.uniform(0.4, 1.3, n)) | (random.random(n) < 0.12)
     numbers = np.where(thin, DENSE + random.integers(0, _THIN, n), random.integers(0, DENSE, n))
@@ -205,7 +218,8 @@ def long(surface: Surface, person: Person) -> Strips:
 
     Args:
         surface: surface of the head.
-        person: the person; `hair_length` is a factor on the usual length.
+        person: the person; `hair_length` is a factor on the usual length, and `hair_fringe` above 0
+            adds a fringe.
     """
     random = np.random.default_rng(34)
     roots, inside = _roots(surface, 0.066, random, "long", fine=1.0)
@@ -237,7 +251,14 @@ def long(surface: Surface, person: Person) -> Strips:
 
 
 def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Generator) -> Strips:
-    """A fringe: hair from behind the hairline falls over the forehead, and ends at one height."""
+    """A fringe: hair from behind the hairline falls over the forehead, and ends at one height.
+
+    Args:
+        surface: surface of the head.
+        person: the person; `hair_fringe` is the length of the fringe, 0 to 1.
+        rows: number of points of a guide.
+        random: generator of the strips.
+    """
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[person.hair_style])
     x, y, z = man.T
@@ -312,7 +333,8 @@ def parted_flow(surface: Surface) -> Floats:
     return tangent(flow, surface.normals)
 
 
-_KNOT = np.array([0.0, 0.46, -1.72])  # position of the bun on the man's head
+# Position of the bun, in decimetres on the man's head as in Surface.man.
+_KNOT = np.array([0.0, 0.46, -1.72])
 
 
 def bun(surface: Surface, person: Person) -> Strips:
@@ -332,7 +354,8 @@ def bun(surface: Surface, person: Person) -> Strips:
     sway = 0.05 * random.normal(0, 1, (n, 3))
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    full = smooth_step(man[:, 1] / 0.4)  # 1 over forehead and temples, where hair is loose
+    # from 0 at the height of the eyes to 1 at 0.4 dm above them, where hair is loose
+    full = smooth_step(man[:, 1] / 0.4)
     rise = np.radians(random.uniform(3, 9, n) + 9 * full), np.zeros(n)
     above = _scalp_vertices(surface)
     least = (0.004 + 0.035 * full + (0.014 + 0.02 * full) * random.random(n)) * surface.scale
@@ -352,7 +375,15 @@ def bun(surface: Surface, person: Person) -> Strips:
 def _knot(
     root: Roots, middle: Floats, axis: Floats, size: float, random: np.random.Generator
 ) -> Strips:
-    """Strips wound about an axis into a ball; the inner ones are opaque."""
+    """Strips wound about an axis into a ball; the inner ones are opaque.
+
+    Args:
+        root: a place on the skin that all strips follow.
+        middle: float64[3], middle of the ball in decimetres.
+        axis: float64[3], unit vector of the axis, away from the skin.
+        size: radius of the ball in decimetres.
+        random: generator of the strips.
+    """
     count, rows = 64, 6
     across = unit(np.cross(axis, [1.0, 0.0, 0.0]))
     other = np.cross(axis, across)

@@ -117,7 +117,7 @@ class Surface:
 
 
 def about(triangles: Ints, count: int) -> Ints:
-    """int64[count, n]: numbers of the triangles at each vertex; short rows repeat the last number.
+    """int64[count, n]: numbers of the triangles at each vertex; short rows repeat their last one.
 
     Args:
         triangles: int64[T, 3], vertices of the triangles.
@@ -156,7 +156,7 @@ def nearest_places(
     Args:
         positions: float64[V, 3], positions of the vertices.
         triangles: int64[T, 3], vertices of the triangles.
-        around: int64[V, n], numbers of the triangles at each vertex, see `about`.
+        around: int64[V, n], numbers of the triangles at each vertex; numbers may be repeated.
         points: float64[n, 3], the points.
         vertex: int64[n], nearest vertex of each point; None: it is searched.
     """
@@ -178,7 +178,13 @@ def nearest_places(
 
 
 def _apart(points: Floats, density: Floats, spacing: float) -> Ints:
-    """Indices of points that are not too near to each other; earlier points have priority."""
+    """Indices of points that are not too near to each other; earlier points have priority.
+
+    Args:
+        points: float64[n, 3].
+        density: float64[n], 0 to 1; the smallest distance is spacing / sqrt(density).
+        spacing: smallest distance at density 1.
+    """
     reach = (spacing / np.sqrt(np.maximum(density, 1e-6))) ** 2
     keep = np.zeros(0, np.int64)
     rest = np.flatnonzero(density > 0.02)

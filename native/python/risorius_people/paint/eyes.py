@@ -25,7 +25,8 @@ def paint_eye(person: Person) -> Floats:
     """float64[EYE_SIZE, EYE_SIZE, 3]: pupil, fibres of the iris, soft limbus, sclera; the gaze is
     at the centre.
 
-    The iris takes a larger part of the texture than of the ball, see side_map.
+    The radius of the iris is IRIS_AT (0.26) of the texture's side, so the iris takes a larger part
+    of the texture than of the ball.
     """
     random = np.random.default_rng(11)
     at = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE - 0.5
@@ -70,7 +71,13 @@ def _polar(
 
 
 def _fibres(around: Floats, reach: Floats, random: np.random.Generator) -> Floats:
-    """float64[h, w] from 0 to 1: fibres that wander, part and meet on their way outward."""
+    """float64[h, w] from 0 to 1: fibres that wander, part and meet on their way outward.
+
+    Args:
+        around: float64[h, w], angle about the pupil in turns.
+        reach: float64[h, w], 0 at the pupil, 1 at the limbus.
+        random: generator of the fibres.
+    """
     bent = around + 0.0055 * _polar(around, reach, 17, 3, random)
     bent = bent + 0.0025 * _polar(around, reach, 61, 4, random)
     out = np.zeros_like(around)
@@ -119,7 +126,14 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
 
 def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Generator) -> Floats:
     """float64[h, w] from 0 to 1: crypts, which are lozenge-shaped gaps between fibres, mostly at
-    the collarette."""
+    the collarette.
+
+    Args:
+        around: float64[h, w], angle about the pupil in turns.
+        reach: float64[h, w], 0 at the pupil, 1 at the limbus.
+        frill: float64[h, w], `reach` of the collarette.
+        random: generator of the crypts.
+    """
     out = np.zeros_like(around)
     for _ in range(_CRYPTS):
         where, at = random.uniform(), random.choice([0.06, 0.16, 0.30]) + random.normal(0, 0.04)
@@ -149,8 +163,8 @@ def _sclera(angle: Floats, aside: Floats, random: np.random.Generator) -> Floats
 
 
 def vessels(random: np.random.Generator) -> Floats:
-    """float64[EYE_SIZE, EYE_SIZE], 0 to 1: fine blood vessels that wander in from behind, fork and
-    thin out.
+    """float64[EYE_SIZE, EYE_SIZE], 0 to 1: fine blood vessels that run from the back of the ball
+    towards the iris, fork and thin out.
 
     Args:
         random: generator of their paths.

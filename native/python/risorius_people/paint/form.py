@@ -24,8 +24,8 @@ _SCALES = ((6, 1.4), (30, 0.42))
 _MOST = 0.016  # decimetres: larger form is of the head and not of its skin
 _SOFT = 5.0  # texels at HEAD_SIZE over which the edges of the mesh are blurred
 _HOLLOW = 0.006  # decimetres: depth at which a hollow has its full colour
-# (ages in years), (factor on the form at these ages). It is smaller for children, because their
-# faces are round.
+# (ages in years), (factor on the form at these ages). The factor is smaller for children, because
+# their faces are round.
 _AGES = ((8, 25), (0.5, 1.0))
 
 
@@ -64,8 +64,8 @@ def _neighbours(edges: Ints, values: Floats) -> Floats:
 def form(polygons: Polygons, places: Floats, face: regions.Face, texels: Texels) -> Floats:
     """float32[n]: heights of the face's form at the texels, in decimetres.
 
-    They are 0 where lips or lids meet, because there the neighbourhood includes the surface behind
-    the rim, and on ears, scalp and neck.
+    The heights are 0 where lips or lids meet, because there the neighbourhood includes the surface
+    behind the rim, and on ears, scalp and neck.
 
     Args:
         polygons: polygons of the head.

@@ -21,7 +21,7 @@ _DOWN = (0.63, 0.25, 1.45)
 
 
 def islands(polygons: Polygons) -> Ints:
-    """int[T]: number of each texture coordinate's island; the largest island is 0.
+    """int[T]: number of each texture coordinate's island; island 0 has the most coordinates.
 
     Args:
         polygons: mesh with texture coordinates.
@@ -85,13 +85,23 @@ def _spread(at: Floats, middle: float, reach: float, more: float) -> Floats:
 
 
 def _into(places: Floats, low: tuple[float, float], high: tuple[float, float]) -> Floats:
-    """Maps coordinates from [0, 1] to a cell of the texture, except the cell's margin."""
+    """Maps coordinates from [0, 1] to a cell of the texture, except the cell's margin.
+
+    Args:
+        places: float64[n, 2] in [0, 1].
+        low, high: lower left and upper right corner of the cell.
+    """
     a, b = np.array(low) + _MARGIN, np.array(high) - _MARGIN
     return np.asarray(a + places * (b - a))
 
 
 def _fitted(places: Floats, low: tuple[float, float], high: tuple[float, float]) -> Floats:
-    """Scales coordinates until they fill a cell, rotated by 90° if they become larger that way."""
+    """Scales coordinates until they fill a cell, rotated by 90° if they become larger that way.
+
+    Args:
+        places: float64[n, 2], coordinates in any range.
+        low, high: lower left and upper right corner of the cell.
+    """
     room = np.array(high) - np.array(low) - 2 * _MARGIN
 
     def scale(size: Floats) -> float:

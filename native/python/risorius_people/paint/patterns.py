@@ -55,7 +55,7 @@ class Dots:
 
         Args:
             share: float[n], 0 to 1, fraction of the points with a dot.
-            at: int[n], texels of the tile, see `laid`.
+            at: int[n], texels of the tile, numbered row by row.
             size: radius of the largest dots, in sides of a cell.
             soft: fraction of the radius over which a dot fades out.
             bent: float[n], added to the distance, to make dots irregular.

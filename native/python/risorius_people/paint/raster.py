@@ -58,7 +58,15 @@ class Raster:
     def _triangles(
         self, begin: int, end: int, low: Ints, span: Ints, room: Ints, size: int
     ) -> None:
-        """Finds the texels inside some triangles, in the rectangle around each triangle."""
+        """Finds the texels inside some triangles, in the rectangle around each triangle.
+
+        Args:
+            begin, end: first triangle, and the triangle after the last one.
+            low: int[F, 2], lowest column and row of each triangle's rectangle.
+            span: int[F, 2], columns and rows of the rectangle.
+            room: int[F], number of texels of the rectangle.
+            size: number of texels of a side of the texture.
+        """
         count = room[begin:end]
         which = np.repeat(np.arange(begin, end), count)
         if not len(which):
@@ -158,7 +166,12 @@ def _halves(whole: Floats) -> Floats:
 
 def _filled(image: Floats, share: Floats) -> Floats:
     """Image / share, the mean of the covered texels in each block; blocks without covered texels
-    take the value of a coarser level."""
+    take the value of a coarser level.
+
+    Args:
+        image: float32[h, w, ...], mean of each block, with 0 for uncovered texels.
+        share: float32[h, w, ...], fraction of covered texels in each block.
+    """
     mean = image / np.maximum(share, 1e-6)
     bare = share == 0
     if min(image.shape[:2]) < 2 or not bare.any():

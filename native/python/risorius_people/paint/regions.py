@@ -23,7 +23,9 @@ FAR_RINGS = 14.0  # largest number of edge loops that are counted
 # number of the base mesh's edge loops from the inside of the mouth to the outer rim of the lips
 LIPS_RINGS = 8.0
 DIVIDED = 2.0  # an edge of the base mesh is divided into this many edges of the head at LOD 0
-_REACH = 0.12  # decimetres: size of the spots of the noise in fields
+# decimetres: size of the spots of the finest of the three noises; the others have spots 1.6 and 2.6
+# times as large
+_REACH = 0.12
 
 
 @dataclass
@@ -34,10 +36,12 @@ class Face:
         x: float64[V], to the side; the character's left is positive.
         y: float64[V], up.
         z: float64[V], to the front.
-        lids: float64[V], motion of a vertex in a blink, as a fraction of the largest, 0 to 1.
+        lids: float64[V], mask of the lids: 0 for vertices that a blink moves by at most a tenth of
+            its largest displacement, 1 from 8 tenths on, and smooth between them.
         mouth: float64[V], number of the base mesh's edge loops from the inside of the mouth, which
-            is an island of the texture; negative inside.
-        eyes: float64[V], number of edge loops from the skin behind the lids; negative there.
+            is an island of the texture; negative inside; limited to 14 and -14.
+        eyes: float64[V], number of edge loops from the skin behind the lids; negative there;
+            limited to 14 and -14.
         uneven: float64[V, 3], three noises with mean 0 and standard deviation about 1, equal on
             both sides of texture seams.
     """
@@ -129,7 +133,7 @@ def lips_of(rings: Floats) -> Floats:
     """float64[V]: 1 on the lips and in the mouth, where no hair grows, else 0.
 
     Args:
-        rings: float64[V], as `Face.mouth`.
+        rings: float64[V], `Face.mouth`.
     """
     return smooth(LIPS_RINGS + 1.0, LIPS_RINGS, rings)
 
@@ -175,19 +179,19 @@ def solid_noise(places: Floats, pitch: float, random: np.random.Generator) -> Fl
 
 
 def ears(face: Face) -> Floats:
-    """Mask of the ears, 0 to 1."""
+    """float64[V]: mask of the ears, 0 to 1."""
     near = np.hypot((face.y + 0.12) / 0.42, (face.z + 0.95) / 0.36)
     return np.asarray(smooth(0.72, 0.80, face.aside) * (1 - smooth(0.8, 1.2, near)))
 
 
 def forehead(face: Face) -> Floats:
-    """Mask of the forehead from the brows to the hair, 0 to 1."""
+    """float64[V]: mask of the forehead from the brows to the hair, 0 to 1."""
     up = smooth(0.16, 0.34, face.y) * (1 - smooth(0.75, 0.95, face.y))
     return np.asarray(up * smooth(-0.75, -0.3, face.z))
 
 
 def blood(face: Face, age: int) -> Floats:
-    """Amount of blood relative to the mean of the face; 1 is a blush.
+    """float64[V]: amount of blood relative to the mean of the face; 1 is a blush.
 
     Args:
         face: vertices of the head.
@@ -214,7 +218,7 @@ def blood(face: Face, age: int) -> Floats:
 
 
 def shade_of_eyes(face: Face) -> Floats:
-    """Mask of the dark skin under the eyes, where veins show, 0 to 1."""
+    """float64[V]: mask of the dark skin under the eyes, where veins show, 0 to 1."""
     along = np.clip((face.aside - 0.13) / 0.30, 0, 1)
     rim = -0.15 - 0.075 * np.sin(np.pi * np.clip(along * 0.9 + 0.05, 0, 1))
     away = np.abs(face.y - rim) / 0.062
@@ -223,7 +227,7 @@ def shade_of_eyes(face: Face) -> Floats:
 
 
 def yellow(face: Face) -> Floats:
-    """Amount of the skin's own yellow, which shows where there is little blood."""
+    """float64[V]: amount of the skin's own yellow, which shows where there is little blood."""
     temple = face.spot(0.56, 0.12, 0.16, 0.22)
     mouth = face.spot(0.0, -0.75, 0.36, 0.2) * (1 - 0.5 * face.spot(0.0, -1.03, 0.15, 0.1))
     out = 0.26 * forehead(face) + 0.2 * temple + 0.22 * mouth
@@ -231,7 +235,7 @@ def yellow(face: Face) -> Floats:
 
 
 def beard(face: Face) -> Floats:
-    """Density of the beard's roots, 0 to 1, with an uneven edge."""
+    """float64[V]: density of the beard's roots, 0 to 1, with an uneven edge."""
     x, y, z = face.aside, face.y, face.z
     line = np.interp(
         x, (0.0, 0.17, 0.3, 0.45, 0.6, 0.72), (-0.53, -0.56, -0.70, -0.66, -0.45, -0.2)
@@ -246,7 +250,7 @@ def beard(face: Face) -> Floats:
 
 
 def pores(face: Face) -> Floats:
-    """Size of the pores, 0 to 1; they are largest on and beside the nose."""
+    """float64[V]: size of the pores, 0 to 1; they are largest on and beside the nose."""
     front = smooth(0.08, 0.2, face.z)
     nose = np.exp(-((face.aside / 0.17) ** 2) - ((face.y + 0.36) / 0.2) ** 2) * front
     cheeks = face.spot(0.28, -0.36, 0.17, 0.17)
@@ -255,7 +259,7 @@ def pores(face: Face) -> Floats:
 
 
 def oil(face: Face) -> Floats:
-    """Amount of gloss of the skin, 0 to 1: on forehead, nose, chin and lids."""
+    """float64[V]: amount of gloss of the skin, 0 to 1: on forehead, nose, chin and lids."""
     front = smooth(0.08, 0.2, face.z)
     nose = np.exp(-((face.aside / 0.14) ** 2) - ((face.y + 0.3) / 0.24) ** 2) * front
     brow = forehead(face) * np.exp(-((face.aside / 0.32) ** 2))
@@ -264,8 +268,8 @@ def oil(face: Face) -> Floats:
 
 
 def freckled(face: Face) -> Floats:
-    """Density of freckles that the sun causes, 0 to 1: on nose and cheeks, and less on the
-    forehead."""
+    """float64[V]: density of freckles that the sun causes, 0 to 1: on nose and cheeks, and less on
+    the forehead."""
     nose = face.spot(0, -0.24, 0.2, 0.13)
     cheeks = face.spot(0.36, -0.3, 0.2, 0.16)
     return np.asarray(
@@ -275,6 +279,6 @@ def freckled(face: Face) -> Floats:
 
 
 def weathered(face: Face) -> Floats:
-    """Density of age spots, 0 to 1: on temples, forehead, outer cheeks, scalp."""
+    """float64[V]: density of age spots, 0 to 1: on temples, forehead, outer cheeks, scalp."""
     sides = face.spot(0.6, 0.1, 0.25, 0.35) + face.spot(0.55, -0.35, 0.2, 0.25)
     return np.asarray(np.clip(sides + 0.6 * forehead(face) + smooth(0.7, 1.0, face.y), 0, 1))

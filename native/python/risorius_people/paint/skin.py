@@ -48,7 +48,8 @@ def depth_of(person: Person) -> float:
 
 
 def _hairline(face: regions.Face, person: Person) -> Floats:
-    """float64[V]: as `hairline_height`, but smaller for sparse hair and on ears."""
+    """float64[V]: distance from the hairline in decimetres, positive on the side with hair; smaller
+    for sparse hair and on ears."""
     at = np.column_stack([face.x, face.y, face.z])
     inside = hairline_height(at, *HAIRLINES[person.hair_style])
     ear = smooth(0.8, 0.86, face.aside) * (1 - smooth(0.35, 0.45, face.y))
@@ -309,7 +310,13 @@ class Skin:
 
 
 def _over(light: Floats, colour: Floats, mask: Floats) -> Floats:
-    """Blends a colour over linear light by a mask from 0 to 1."""
+    """Blends a colour over linear light by a mask from 0 to 1.
+
+    Args:
+        light: float32[n, 3], linear light.
+        colour: float[3] or [n, 3], linear light of the colour.
+        mask: float[n]; values are clipped to 0 to 1.
+    """
     mask = np.clip(mask, 0, 1).astype(np.float32)[:, None]
     out = np.asarray(light * (1 - mask))
     out += colour.astype(np.float32) * mask

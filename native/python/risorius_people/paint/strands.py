@@ -12,8 +12,8 @@ from ..polygons import Floats
 from .atlas import ATLAS_SIZE, DENSE, TILES
 
 _GREY = (0.74, 0.73, 0.71)
-_LASH_DARK = 0.3  # factor on the brows' colour, which gives that of the lashes
-_LOOSE = 0.6  # see _Hairs.loose
+_LASH_DARK = 0.3  # the lashes' colour is the brows' colour multiplied by this
+_LOOSE = 0.6  # _Hairs.loose of the beard's tiles and of the thin tiles of straight scalp hair
 _CURLY = 0.6  # hair_curl above which single hairs are not visible
 
 
@@ -56,7 +56,8 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
     wave, waves = 0.16 * curl, 1.5 + 7.0 * curl
     long = person.hair_style in ("long", "bun")
     length = (0.75, 1.0) if long else (0.5, 1.0)
-    begin = {"long": 0.05, "bun": 0.1}.get(person.hair_style, 0.3)  # a centimetre or less
+    # roots are at most about a centimetre above the lower edge of the card
+    begin = {"long": 0.05, "bun": 0.1}.get(person.hair_style, 0.3)
     scalp = (74, 68, 61, 70, 64, 32, 24, 16) if straight else (34, 31, 28, 33, 30, 17, 13, 9)
     return {
         "scalp": _Hairs(
@@ -80,7 +81,14 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
 
 
 def _shades(colour: Colour, grey: float, count: int, random: np.random.Generator) -> Floats:
-    """float64[count, 3]: colours of single hairs, some of them grey."""
+    """float64[count, 3]: colours of single hairs, some of them grey.
+
+    Args:
+        colour: mean colour of the hairs, sRGB in [0, 1].
+        grey: fraction of grey hairs.
+        count: number of hairs.
+        random: generator of the colours.
+    """
     own = np.array(colour) * random.uniform(0.78, 1.28, (count, 1))
     own = own + random.normal(0, 0.012, (count, 1)) * [1.2, 0.6, 0.2]  # some hairs are redder
     white = np.array(_GREY) * random.uniform(0.55, 1.0, (count, 1))
@@ -95,7 +103,16 @@ def _paint_tile(
     grey: float,
     random: np.random.Generator,
 ) -> Floats:
-    """float64[height, width, 4]: a tile of hairs from root (row 0) to tip; later ones on top."""
+    """float64[height, width, 4]: a tile of hairs from root (row 0) to tip; later hairs are on top.
+
+    Args:
+        hairs: look of the hairs.
+        number: number of the tile, which selects the number of hairs.
+        size: width and height of the tile in texels.
+        colour: mean colour of the hairs.
+        grey: fraction of grey hairs.
+        random: generator of the hairs.
+    """
     width, height = size
     image = np.zeros((height, width, 4))
     v = (np.arange(height) + 0.5) / height

@@ -218,7 +218,7 @@ def paint_textures(
         own: float64[V, 3], all vertices of the person.
         units: raw control -> expression.
         parts: the meshes of the face.
-        largest: largest number of texels of a texture, as the side of a square.
+        largest: a texture has at most as many texels as a square with this side.
 
     Returns:
         File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name.
@@ -258,14 +258,14 @@ def paint_textures(
 def packable(name: str, image: Floats, largest: int) -> Floats:
     """A texture at the size and precision in which it is stored.
 
-    Textures of eyes get half the side. Textures up to 1024 x 1024 are part of the released zip:
-    head and eyes keep 7 of 8 bits, the head's roughness 6, because the lower bits are noise, which
-    PNG cannot compress.
+    Textures of eyes have at most half of this side. If `largest` is at most 1024, as for the
+    released zip, head and eyes keep 7 of 8 bits, the head's roughness 6, because the lower bits are
+    noise, which PNG cannot compress.
 
     Args:
         name: file name of the texture.
         image: float64[h, w, ...] in [0, 1].
-        largest: largest number of texels, as the side of a square.
+        largest: a texture has at most as many texels as a square with this side.
     """
     out = shrunk(image, largest // 2 if name.startswith("eye") else largest)
     if largest > 1024 or not name.startswith(("head_", "eye_")):

@@ -262,12 +262,12 @@ STEPS: tuple[Step, ...] = (
 
 
 def run(hand: Hand, dna: Path, wanted: list[str]) -> int:
-    """Run the steps and print their rows. Returns the number of failed checks.
+    """Run the steps and print their rows. Returns the number of failed checks and steps.
 
     Args:
         hand: the pointer.
         dna: the DNA file to import.
-        wanted: names of the steps; empty for all.
+        wanted: names of the steps; empty for all. An unknown name counts as a failed check.
     """
     strange = set(wanted) - {step.__name__ for step in STEPS}
     failed = len(strange)

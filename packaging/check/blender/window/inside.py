@@ -129,7 +129,7 @@ def see(code):
 
 
 def state():
-    """Frame, areas, last operator and, if there is a face, its sliders, layers and modes."""
+    """Frame, areas, last operator; if there is a face, its sliders except 0, layers and modes."""
     found = rig()
     operators = bpy.context.window_manager.operators
     out = {
@@ -288,7 +288,7 @@ def board_in_view(names):
 
 
 def least_travel(names):
-    """The smallest travel of these handles from neutral to the end of an axis, pixels."""
+    """The smallest travel of these handles from neutral to the farther end of an axis, pixels."""
     controls, found = rig()["risorius_controls"], []
     for bone in (controls.pose.bones[n] for n in names):
         limit = next((c for c in bone.constraints if c.type == "LIMIT_LOCATION"), None)
@@ -390,7 +390,7 @@ def tweaks():
 
 
 def given_by_board(control):
-    """The value to which the face board sets a raw control."""
+    """The value to which the face board sets a raw control; 0 if the board does not drive it."""
     return float(module("scene.character.board").given(rig()).get(control, 0.0))
 
 
@@ -417,7 +417,7 @@ def found_causes():
 
 
 def settle():
-    """Set the 3D view to the orthographic front view, as an import does."""
+    """Set the 3D view to the orthographic front view, and hide the floor."""
     area, drawing, _sidebar = view()
     with over(area, drawing):
         bpy.ops.view3d.view_axis(type="FRONT")

@@ -118,7 +118,10 @@ def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _in_editors(hand: Hand, frames: list[int]) -> Iterator[Check]:
-    """Check the keyframes in the dope sheet and in the graph editor; each fills the window."""
+    """Check the keyframes in the dope sheet and in the graph editor, and move some by four frames.
+
+    Each editor fills the window.
+    """
     area = hand.ask("ready")["areas"]["DOPESHEET_EDITOR"]
     over_keys = (area[0] + area[2] * 0.7, area[1] + area[3] * 0.6)
     hand.ask("run", code=KEEP_EDITOR)

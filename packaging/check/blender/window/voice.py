@@ -28,7 +28,7 @@ NEAR = 12.0  # distance in frames from a sound within which its keys may change
 
 
 def voice(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Test Speak from Audio. Without PocketSphinx, a message must come before the file browser."""
+    """Test Speak from Audio. Without PocketSphinx, a menu must open instead of the file browser."""
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)

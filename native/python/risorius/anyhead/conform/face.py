@@ -52,7 +52,8 @@ def conform(
     closest point, each eye keeps its shape and is fitted into the lids, and teeth and tongue move
     as one rigid part. A joint follows the skin that it carries. Blend shapes and joint translations
     are transformed by the deformation gradients. Joint rotations and the layers of solvers and
-    networks stay unchanged. Controls that close the lids are adjusted until the lids meet again.
+    networks stay unchanged, except that root joints are rotated with a rotated head. Controls that
+    close the lids are adjusted until the lids meet again.
 
     Args:
         dna: the source face; it is not changed.
@@ -116,7 +117,9 @@ def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Dou
                 f"{name}: {counts[name]:,} places were expected, found {len(out[name]):,}"
             )
         if not (np.abs(out[name]) <= FARTHEST).all():
-            raise ArgumentError(f"{name}: a vertex lies at no place that a number can say")
+            raise ArgumentError(
+                f"{name}: a vertex lies at no place that a number can say (NaN or infinity)"
+            )
     own = out[dna.mesh_names[skin]]
     if np.ptp(own, axis=0).max() <= 0:
         raise ArgumentError(f"{dna.mesh_names[skin]}: all vertices lie at one place")

@@ -29,8 +29,10 @@ _SKIN = 0.1  # a mesh with more than this fraction of the skin's vertices is a c
 def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
     """Append correctives to a face. Returns the new face.
 
-    If a combination already has a corrective, the displacements are added to its shapes. Lashes and
-    coarser LODs get the displacements of the nearest skin.
+    If a combination already has a corrective, the displacements are added to its shapes. At LODs
+    that use all blend shape channels, other skins, lashes and other meshes with blend shapes get
+    the displacements of the nearest skin, which fade out at distances from 6 to 12 mm; teeth and
+    eyeballs do not.
 
     Args:
         dna: a face of shapes; it is not changed.
@@ -56,7 +58,8 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
 
 
 def _channels(dna: Dna) -> dict[frozenset[int], int]:
-    """Controls of a corrective -> its blend shape channel."""
+    """Controls of a corrective -> its blend shape channel; correctives without a channel have no
+    entry."""
     channels = dna.blend_shape_channels
     of_input = {
         int(c): int(o) for c, o in zip(channels.input_indices, channels.output_indices, strict=True)

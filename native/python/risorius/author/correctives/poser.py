@@ -40,7 +40,8 @@ class Poser:
         return [mesh.positions for mesh in self._meshes]
 
     def motions(self, on: Controls) -> Doubles | None:
-        """float64[joints, 3, 4]: matrices of the joints' motions from the rest pose to the pose.
+        """float64[joints, 3, 4]: matrices of the joints' motions from the rest pose to the pose
+        with the controls `on` at 1.
 
         None if no joint moves.
         """
@@ -128,7 +129,8 @@ def skin_and_solids(
 
     Args:
         dna: the face.
-        solids: parts of the names of meshes that the skin must not intersect.
+        solids: parts of the names of meshes that the skin must not intersect. Meshes whose names
+            also contain a word of _NO_SOLIDS, such as eyelashes, are no solids.
         lod: index of the LOD.
 
     Raises:

@@ -77,8 +77,10 @@ class Found:
     correctives: list[Corrective] = field(default_factory=list)
     looked_at: int = 0  # number of checked pairs
     faulty: int = 0  # number of pairs with faults
-    before: dict[str, float] = field(default_factory=dict)  # kind -> sum over pairs
-    after: dict[str, float] = field(default_factory=dict)  # the same with correctives
+    # kind of fault, one of KINDS -> sum over all checked pairs, without correctives
+    before: dict[str, float] = field(default_factory=dict)
+    # kind of fault -> sum over all checked pairs, with the correctives of pairs
+    after: dict[str, float] = field(default_factory=dict)
 
 
 class Search:
@@ -124,7 +126,8 @@ class Search:
         return self._look(self.poser.pose(on))
 
     def allowed(self, on: Controls) -> SkinFaults:
-        """The faults that a combination may have, because its controls or their pairs have them."""
+        """The faults that a combination may have, because the neutral pose, one of its controls or,
+        for three or more controls, a pair of them has these faults."""
         parts: list[Controls] = [(), *((c,) for c in on)]
         if len(on) > 2:
             parts += itertools.combinations(on, 2)
@@ -158,7 +161,8 @@ class Search:
         return self._all(look, combinations, share)
 
     def repair(self, combinations: Sequence[Controls], share: tuple[float, float]) -> None:
-        """Make correctives for combinations. Poses include the correctives of earlier calls.
+        """Make correctives for combinations. Poses include the correctives of earlier calls. A
+        corrective that moves no vertex by more than 0.1 mm is not kept.
 
         Args:
             combinations: the combinations.
@@ -191,7 +195,8 @@ class Search:
 
 
 def _level(dna: Dna) -> int:
-    """The coarsest LOD whose skin has shapes and at least _ENOUGH vertices."""
+    """The coarsest LOD whose skin has blend shapes and at least _ENOUGH (3000) vertices; 0 if there
+    is none."""
 
     def fine(lod: int) -> bool:
         skin = dna.meshes[skin_and_solids(dna, (), lod)[0]]
@@ -201,7 +206,8 @@ def _level(dna: Dna) -> int:
 
 
 def severity(sums: FaultSums) -> float:
-    """A single number for the visible badness of faults."""
+    """A single number for the visibility of faults: 1 for 100 mm3 of intersection, or for five
+    stretched or folded faces."""
     return sums.volume / _VOLUME + (sums.stretched + sums.folded) / _FACES
 
 
@@ -259,6 +265,7 @@ def correct_again(
         progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
+        ArgumentError: the face has no mesh, or has networks or solvers.
         DnaError: a value is not finite, or progress returned False.
     """
     search = Search(rig, options, progress, psd_parts(source).values())

@@ -18,7 +18,8 @@ _CELLS = 16  # cells of the grid along each axis by which vertices are sorted
 
 
 def blocks_of(positions: Doubles) -> list[Ints]:
-    """Sorted vertex indices of each block: one block for at most LARGE vertices, else several.
+    """Sorted vertex indices of each block: one block for at most LARGE (60,000) vertices, else
+    several.
 
     The vertices of a block are near each other.
 
@@ -40,7 +41,8 @@ def blocks_of(positions: Doubles) -> list[Ints]:
 
 
 def split_mesh(mesh: Mesh, blocks: Sequence[Ints]) -> list[Mesh]:
-    """A mesh of each block with positions, skin weights and blend shapes, but without polygons.
+    """A mesh of each block with positions, skin weights and blend shapes, but without polygons; the
+    mesh itself if there is one block with all vertices.
 
     Args:
         mesh: the mesh.

@@ -33,7 +33,7 @@ class Simplified:
         kept: int64[n], index in the whole mesh of each vertex.
         corners: int64[V, 3], vertices of the simplified mesh that surround each vertex of the whole
             mesh.
-        shares: float64[V, 3], share of each of them.
+        shares: float64[V, 3], weight of each of these corners; each row has the sum 1.
     """
 
     mesh: Mesh
@@ -119,7 +119,8 @@ def fewer_vertices(
 
 
 def _finer(levels: Mapping[tuple[int, int], Ints], m: int, vertices: int) -> Ints | None:
-    """The triangles of the coarsest level that has clearly more vertices than wanted, or None."""
+    """The triangles of mesh `m` at the coarsest LOD that has more than 4 * `vertices` triangles;
+    None if no LOD has more."""
     able = [t for (_, mesh), t in levels.items() if mesh == m and len(t) > 4 * vertices]
     return min(able, key=len, default=None)
 
@@ -143,8 +144,9 @@ def _simplified(wanted: Wanted, triangles: Ints) -> Simplified:
 
 
 def _nearest(whole: Mesh, small: Mesh) -> tuple[Ints, Doubles]:
-    """The nearest triangle of the simplified mesh with a similar normal, and shares of its corners:
-    int64[V, 3], float64[V, 3]."""
+    """For each vertex of the whole mesh, int64[V, 3]: the corners of the nearest triangle of the
+    simplified mesh, and float64[V, 3]: barycentric coordinates. Only triangles with a similar
+    normal are searched; if there is none, all triangles are searched."""
     positions = np.asarray(small.positions, np.float64)
     triangles = np.asarray(small.layout_positions, np.int64)[fan_triangles(small)]
     points = np.asarray(whole.positions, np.float64)
@@ -178,7 +180,7 @@ def _take_own(wanted: Wanted, kept: Ints, corners: Ints, shares: Doubles) -> Non
     such as vertices of a lip that lie nearer to the other lip.
 
     A vertex gets the kept vertex that is nearest along the edges if the motion of this kept vertex
-    is more similar to its motion than the motion of the nearest triangle.
+    is more similar to the vertex's motion than the motion of the nearest triangle.
 
     Args:
         wanted: the displacements of the whole mesh.

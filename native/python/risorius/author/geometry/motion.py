@@ -36,6 +36,8 @@ class Motion(NamedTuple):
 def motions_of(dna: Dna, columns: Sequence[int], budget: Budget) -> Iterator[Motion]:
     """Yields a Motion for each input; the arrays of the Motion are empty if no joint moves.
 
+    Inputs that the joint groups read come first, in ascending order, then all others.
+
     Args:
         dna: the face.
         columns: indices of the inputs.
@@ -118,7 +120,7 @@ class Mover:
         self._place = np.full(len(dna.joint_names), -1)
 
     def sums(self, amounts: Doubles) -> Doubles:
-        """float64[V]: for each vertex, the sum of its weights times its joints' amounts.
+        """float64[V]: for each vertex, the sum over its joints of weight times the joint's amount.
 
         Args:
             amounts: float64[joints], a number for each joint.

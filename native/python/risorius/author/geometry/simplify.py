@@ -22,8 +22,8 @@ _STUCK = 1.5  # factor of the vertex budget above which seams of the texture are
 # _SMALL_PIECE of the mesh are all removed if they would keep fewer than _GONE vertices on average.
 _LEAST_OF_PIECE, _SMALL_PIECE, _GONE = 8, 0.06, 3.0
 _CARD, _MANY = 16, 60  # largest number of vertices of a hair card; smallest number of cards of hair
-# The fraction of kept hair cards is the fraction of kept vertices to this power. It is below 1, so
-# that more cards stay, because missing cards are more visible than a coarser skin.
+# The fraction of kept hair cards is the fraction of kept vertices to this power. The power is below
+# 1, so that more cards stay, because missing cards are more visible than a coarser skin.
 _THINNED = 0.6
 
 Floats = npt.NDArray[np.float32]
@@ -81,7 +81,8 @@ def _size(mesh: Mesh) -> float:
 
 
 def pieces_of(mesh: Mesh) -> Ints:
-    """int64[V]: number of the connected piece of each vertex; texture seams do not separate.
+    """int64[V]: number of the connected piece of each vertex; texture seams do not separate, and
+    vertices at the same position are connected.
 
     Args:
         mesh: the mesh.
@@ -124,7 +125,8 @@ def fewer_triangles(
     The simplification preserves the shape of the surface, its texture coordinates and its
     displacements by expressions. Borders and seams stay in place. If seams prevent the reduction,
     they are welded, and each vertex keeps one texture coordinate. Each connected piece keeps some
-    vertices, or all small pieces are removed.
+    vertices, or all small pieces are removed. Of the cards of hair, some are kept whole, and the
+    others are removed.
 
     Args:
         mesh: the mesh; it is not changed.
@@ -209,7 +211,8 @@ def _fewer(
     # A closed surface has twice as many triangles as vertices; an open surface has fewer.
     count, found = 2 * vertices, triangles
     for _ in range(_TRIES):
-        begin = found if len(triangles) > 4 * LARGE else triangles  # to save time
+        # To save time, each try on a large mesh simplifies the result of the try before it.
+        begin = found if len(triangles) > 4 * LARGE else triangles
         found, _ = _native.simplify(points, attributes, begin, count)
         now = len(np.unique(places[found]))
         if now <= vertices or not len(found):
@@ -219,7 +222,8 @@ def _fewer(
 
 
 def simplified(mesh: Mesh, triangles: Ints) -> tuple[Mesh, Ints]:
-    """A mesh that consists of given triangles of a fine mesh, without shapes.
+    """A mesh that consists of given triangles of a fine mesh, without shapes. The caller must
+    replace the skin weights, because the new mesh still has the weights of the fine mesh.
 
     Args:
         mesh: the fine mesh.

@@ -86,7 +86,8 @@ def matrices_of_vectors(vectors: Doubles) -> Doubles:
 
 
 def column_count(dna: Dna) -> int:
-    """The number of inputs of joint groups and blend shape channels."""
+    """The number of inputs of joint groups and blend shape channels, at least the number of raw
+    controls."""
     lists = [g.input_indices for g in dna.joint_groups] + [dna.blend_shape_channels.input_indices]
     most = max((int(values.max()) + 1 for values in lists if len(values)), default=0)
     # The file's own column count is not used, because no reader checks it against the joint groups.
@@ -190,7 +191,8 @@ def skin_entries(mesh: Mesh) -> tuple[Ints, Ints, Doubles]:
 
 
 def dense_weights(mesh: Mesh, joints: int) -> Doubles:
-    """float64[V, joints]: skin weights as a dense matrix; rows have the sum 1.
+    """float64[V, joints]: skin weights as a dense matrix; rows have the sum 1, or 0 for a vertex
+    without weights.
 
     Args:
         mesh: the mesh.
@@ -216,7 +218,7 @@ def column_shapes(dna: Dna, mesh: Mesh, columns: int) -> dict[int, Doubles]:
             if column < columns:
                 delta = out.setdefault(column, np.zeros((len(mesh.positions), 3)))
                 vertices = np.asarray(target.vertex_indices, np.int64)
-                if (np.diff(vertices) > 0).all():  # each vertex once
+                if (np.diff(vertices) > 0).all():  # no vertex occurs twice
                     delta[vertices] += target.deltas
                 else:
                     np.add.at(delta, vertices, target.deltas)

@@ -20,8 +20,8 @@ Numbers = npt.NDArray[Any]
 class SparseShapes(MutableMapping[K, Doubles]):
     """Displacements float64[V, 3] by key; only the vertices that move are stored.
 
-    Reading a key makes a new array. If there are more than LARGE vertices, the displacements are
-    stored as float32.
+    Reading a key makes a new array. If there are more than LARGE (60,000) vertices, the
+    displacements are stored as float32.
 
     Attributes:
         count: number of vertices.
@@ -65,11 +65,11 @@ class SparseShapes(MutableMapping[K, Doubles]):
         return key in self._held
 
     def add(self, key: K, value: Doubles, first: int) -> None:
-        """Add displacements of some vertices to a key that these vertices do not have yet.
+        """Add displacements of some vertices to a key that has no displacements of them yet.
 
         Args:
             key: the key; it may be new.
-            value: float64[n, 3], displacements of the vertices `first` to `first + n`.
+            value: float64[n, 3], displacements of the vertices `first` to `first + n - 1`.
             first: index of the first of these vertices.
         """
         none = np.zeros(0, np.int32), np.zeros((0, 3), self._dtype)
@@ -81,7 +81,7 @@ class SparseShapes(MutableMapping[K, Doubles]):
         )
 
     def take(self, key: K, other: SparseShapes[L], their: L) -> None:
-        """Hold displacements of another object without a copy.
+        """Take the displacements of a key of another object without a copy.
 
         Args:
             key: the key here.

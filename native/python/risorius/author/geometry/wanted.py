@@ -16,7 +16,7 @@ from .skeleton import Doubles, Ints
 
 
 class Face(Protocol):
-    """The part of author.work.Work that the displacements depend on."""
+    """The attributes of author.work.Work from which the displacements are computed."""
 
     source: Dna
     columns: list[int]
@@ -41,8 +41,8 @@ class Block(NamedTuple):
 class Wanted:
     """The displacements of a mesh with each input at 1.
 
-    For a mesh of at most LARGE vertices the displacements are stored. For a larger mesh they are
-    computed again at each use.
+    For a mesh of at most LARGE (60,000) vertices the displacements are stored. For a larger mesh
+    they are computed again at each use.
 
     Attributes:
         mesh: the mesh.

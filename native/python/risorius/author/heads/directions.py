@@ -131,8 +131,9 @@ class _Look:
     def named_left(self) -> tuple[Doubles | None, int, float]:
         """The axis from shapes named right to shapes named left.
 
-        Returns: the axis or None, the number of agreeing pairs, and the angle to the axis in
-            degrees (0 for small angles).
+        Returns: the axis, the number of agreeing pairs, and the angle to the axis in degrees (0 for
+            angles below 37 degrees). The axis is None if there are no pairs, or if a third of them
+            or more disagree.
         """
         sides: dict[str, dict[str, Doubles]] = {}
         for name, controls, center, _, _ in self.rows:
@@ -153,7 +154,8 @@ class _Look:
         return (axis, agreed, turned) if 3 * agreed > 2 * len(apart) else (None, 0, 0.0)
 
     def up(self, taken: Sequence[Doubles]) -> tuple[Doubles, bool]:
-        """The axis from the mouth to the brows, and whether it is sure.
+        """The axis from the mouth to the brows, and whether the shapes determine it; otherwise the
+        axis is +y, or +z if y is taken.
 
         Args:
             taken: axes to which the result must be perpendicular.
@@ -181,7 +183,13 @@ class _Look:
         return (_Y if free[1] else _Z), False
 
     def front(self, left: Doubles | None, up: Doubles) -> tuple[Doubles, bool]:
-        """The axis along which the face looks, and whether it is sure."""
+        """The axis along which the face looks, and whether the shapes determine it; otherwise the
+        axis is a guess.
+
+        Args:
+            left: axis of the left side, or None.
+            up: axis of the top.
+        """
         if left is not None and abs(np.dot(left, up)) < 0.5:
             across = [left]
         else:  # the axis across which the mesh is most symmetric
@@ -195,7 +203,12 @@ class _Look:
         return (np.asarray(np.cross(left, up)) if left is not None else guess), False
 
     def _forward(self, axis: Doubles, across: Doubles) -> float:
-        """A vote: positive if the face looks along an axis, negative if against it."""
+        """A vote: positive if the face looks along an axis, negative if against it.
+
+        Args:
+            axis: float64[3], the axis.
+            across: float64[3], the axis from side to side.
+        """
         depth = self.points @ axis
         if not self.rows:
             return 0.0
@@ -218,7 +231,12 @@ class _Look:
         return vote
 
     def _near(self, centers: Doubles, across: Doubles) -> Ints:
-        """Indices of the vertices near the centres of the shapes; excludes the back of the head."""
+        """Indices of the vertices near the centres of the shapes; excludes the back of the head.
+
+        Args:
+            centers: float64[n, 3], the centre of each shape.
+            across: float64[3], the axis from side to side.
+        """
         middle = np.median(centers, axis=0)
         reach = 0.35 * max(float(np.ptp(self.points @ across)), 1e-9)
         away = self.points - middle

@@ -41,7 +41,8 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
     """Divide a mesh by materials; each island gets the material of most of its polygons.
 
     Polygons whose material is named like an eye or a part of the mouth are always cut off, even
-    inside an island.
+    inside an island. A mesh with one material, or with another number of polygons than `of_face`
+    has, stays whole and gets the most frequent material.
 
     Args:
         part: the mesh.
@@ -71,7 +72,13 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
 
 
 def _tell(part: HeadPart, looks: Sequence[Material], lost: set[int]) -> None:
-    """Add a note to the part's material if materials with pictures are left out."""
+    """Add a note to the part's material if materials with pictures are left out.
+
+    Args:
+        part: the mesh; its material gets the note.
+        looks: the materials of the file.
+        lost: indices of the materials that no part of the mesh has.
+    """
     names = [looks[place].name for place in sorted(lost) if looks[place].pictures]
     if names and part.material is not None:
         part.material.notes.append(
@@ -81,9 +88,10 @@ def _tell(part: HeadPart, looks: Sequence[Material], lost: set[int]) -> None:
 
 
 def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None:
-    """Fit a sphere to vertices. Returns None if they do not lie on a sphere or cover too little.
+    """Fit a sphere to vertices. Returns None for fewer than 12 vertices, and for vertices that do
+    not lie on a sphere or cover too little of it.
 
-    They must extend over at least 1.2 radii along one axis and 0.8 radii along every axis.
+    The vertices must extend over at least 1.2 radii along one axis and 0.8 radii along every axis.
 
     Args:
         points: float64[V, 3], vertex positions of the mesh.

@@ -261,7 +261,14 @@ class _Joining:
     def _sort(
         self, part: HeadPart, places: Places, moving: list[HeadPart], still: list[HeadPart]
     ) -> None:
-        """Add a mesh to the moving or to the still meshes, or to the left-out meshes."""
+        """Add a mesh to the moving or to the still meshes, or to the left-out meshes.
+
+        Args:
+            part: the mesh.
+            places: places of the face.
+            moving: receives a mesh with shapes that belongs to the head.
+            still: receives a mesh without shapes that belongs to the head.
+        """
         shapes = in_face_names(self.face, part)
         size = float(np.ptp(part.mesh.positions, axis=0).max()) or 1.0
         part.shapes = {n: d for n, d in shapes.items() if np.abs(d).max(initial=0) > 1e-6 * size}
@@ -313,7 +320,14 @@ class _Joining:
         opening: Doubles | None,
         turns: list[Turn],
     ) -> list[tuple[HeadPart, str]]:
-        """Add the jaw's joint. If jawOpen rotates nothing, the jaw's meshes follow the head."""
+        """Add the jaw's joint. If no shape opens the mouth, or if it rotates nothing, no joint is
+        added, and the jaw's meshes follow the head.
+
+        Args:
+            hanging: each mesh, and the joint that it follows.
+            opening: float64[V, 3], displacements of the shape that opens the mouth, or None.
+            turns: list that receives the jaw's joint.
+        """
         turn = None
         if opening is not None:
             points, whole = self.face.mesh.positions, list(self.became.expressions)
@@ -351,7 +365,8 @@ class _Joining:
         return Joined(whole, shapes, out, turns, self.left, self.unit, self.notes)
 
     def _empty(self, names: Mapping[str, None], count: int) -> MutableMapping[str, Doubles]:
-        """Shapes of `count` vertices that do not move, in the form of the face's shapes."""
+        """Shapes of `count` vertices that do not move; SparseShapes if the face's shapes are,
+        otherwise a dictionary."""
         ordered = self._in_order(names)
         if not isinstance(self.face.shapes, SparseShapes):
             return {name: np.zeros((count, 3)) for name in ordered}
@@ -368,7 +383,14 @@ class _Joining:
 
 def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
     """Append a mesh. The corners of a mesh without texture coordinates all get the same
-    coordinate."""
+    coordinate.
+
+    Args:
+        whole: the joined mesh; changed.
+        uvs: texture coordinates of the meshes that are already joined; changed.
+        mesh: the mesh to append.
+        start: index of its first vertex in the joined mesh.
+    """
     base = sum(map(len, uvs))
     own, uv_faces = mesh.uvs, mesh.uv_faces
     if not len(own) or not all(uv_faces):

@@ -111,7 +111,8 @@ def meaning(name: str) -> tuple[str, ...]:
 
 
 def in_face_names(face: HeadPart, part: HeadPart) -> dict[str, Doubles]:
-    """The shapes of a mesh, renamed to the face's shapes with the same meaning.
+    """The shapes of a mesh, renamed to the face's shapes with the same meaning; others keep their
+    names. Of several shapes with the same new name, the first is kept.
 
     Args:
         face: the mesh of the face.
@@ -134,7 +135,8 @@ def taken_apart(part: HeadPart, names: Sequence[str], of_face: Ints) -> list[Hea
     """Divide a mesh by labels of its polygons. Vertices on a cut are duplicated.
 
     Args:
-        part: the mesh; it is not changed. names: label -> name of the new part.
+        part: the mesh; it is not changed.
+        names: name of the new part of each label; a label without polygons gives no part.
         of_face: int64[polygons], label of each polygon; -1 leaves the polygon out.
     """
     out = []

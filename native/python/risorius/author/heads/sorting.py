@@ -42,7 +42,7 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
 
     Raises:
         ShapeFileError: no mesh has shapes that move it, no such mesh has the wanted name, or the
-            file has several heads.
+            file has several heads and neither `wanted` nor `rather` chooses one.
     """
     able = [part for part in parts if moves(part)]
     named = [part for part in able if part.source == wanted] if wanted else able
@@ -63,8 +63,8 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str 
     if others and not wanted:
         names = joined([face.name, *(part.name for part in others)])
         raise ShapeFileError(
-            f"{where}: one head was expected, {names} have the same shapes at places of their own: "
-            "source.mesh says which one is meant"
+            f"{where}: one head was expected, {names} have the same shapes at different places: "
+            "name one of them in source.mesh"
         )
     return face
 

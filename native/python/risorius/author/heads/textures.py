@@ -42,7 +42,8 @@ def texture_folder(dna: Path) -> Path:
 
 
 def textures_of(materials: Mapping[str, Material], folder: Path) -> Textures:
-    """The texture files of a face's materials. A colour without a picture becomes a small picture.
+    """The texture files of a face's materials. A colour other than white without a picture becomes
+    a picture of 4 x 4 pixels.
 
     Args:
         materials: name of a mesh of LOD 0 -> its material.
@@ -94,7 +95,7 @@ def metadata_of(
         material = materials.get(_LOD.sub("_lod0_", name))
         for (number, role), file in textures.names.items():
             if number == id(material):
-                use = "roughness" if role == "orm" else role  # the file name tells the channel
+                use = "roughness" if role == "orm" else role  # the file's name says orm
                 out[f"texture:{name}:{use}"] = file
     return out
 

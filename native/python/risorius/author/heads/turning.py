@@ -20,11 +20,15 @@ LOOKS = {"eyeLookUp": (-25, 0), "eyeLookDown": (30, 0), "eyeLookLeft": (0, 30),
           "eyeLookRight": (0, -30)}  # fmt: skip
 _EYE = re.compile(r"eye|iris|pupil|sclera|cornea", re.IGNORECASE)
 _BESIDE = re.compile(r"lash|brow|lid|eyeline|shadow|wet|edge|occl|glass|tear|shell", re.IGNORECASE)
-_NAMED_ROUND = 0.18  # as islands.ball_of's `off`, for meshes named eye, because corneas bulge
+# Largest standard deviation from the radius, in radii, of a sphere in a mesh named like an eye. It
+# is larger than for other meshes, because corneas bulge.
+_NAMED_ROUND = 0.18
 _SIZES = (0.02, 0.16)  # smallest and largest radius of an eye, in heights of the face
 _INSIDE = 1.1  # in radii: islands within this distance turn with the eye
 _NONE = np.zeros(0, np.int64)
-_FRONT, _SQUASH = 0.6, 0.25  # in radii, see _looks_out and _is_squashed
+# In radii. A sphere without vertices farther than _FRONT in front of its centre is a hollow socket.
+# A shape deforms a sphere if most vertices are farther than _SQUASH from their rigid motion.
+_FRONT, _SQUASH = 0.6, 0.25
 _LEAST_ANGLE = 0.03  # radians; smaller rotations do not count
 _NO_TURN = 0.4  # largest error of a rotation relative to a shape's largest displacement
 # Vertices that jawOpen moves by more than _HELD of its largest displacement count as rigid parts of
@@ -90,7 +94,13 @@ def take_eyes(
 
 
 def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
-    """The islands of a mesh that have the form and the size of eyes."""
+    """The islands of a mesh that have the form and the size of eyes.
+
+    Args:
+        part: the mesh.
+        islands: int64[V], island of each vertex.
+        height: height of the face.
+    """
     named = _EYE.search(part.name) is not None
     if _BESIDE.search(part.name):
         return []
@@ -129,9 +139,15 @@ def _is_squashed(part: HeadPart, ball: Ball) -> bool:
 def _pair(
     parts: Sequence[HeadPart], found: Sequence[tuple[int, Ball]], lids: Mapping[str, Doubles]
 ) -> tuple[tuple[int, Ball], tuple[int, Ball]] | None:
-    """The pair of spheres that may be left and right eye, each with the index of its mesh.
+    """The left and the right eye among spheres, each with the index of its mesh; None if no two
+    spheres lie like eyes.
 
     Meshes named like eyes come before other meshes, then larger spheres before smaller ones.
+
+    Args:
+        parts: the meshes.
+        found: index of the mesh, and sphere, of each candidate.
+        lids: L or R -> float64[3], the mean position of the vertices that a blink moves.
     """
     best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
     for i, left in found:
@@ -162,8 +178,8 @@ def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
 def _divided(
     part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
 ) -> list[HeadPart]:
-    """Give each island of a mesh that lies inside an eye's sphere to that eye. Returns the other
-    islands as a mesh.
+    """Give each island of a mesh that lies inside an eye's sphere to that eye. Returns a list of
+    one mesh of the other islands; the list is empty if there are none.
 
     Args:
         part: the mesh.
@@ -183,7 +199,7 @@ def _divided(
         np.maximum.at(furthest, islands, away)
         reach = _INSIDE * eye.ball.radius
         if _EYE.search(part.name):
-            reach *= 1.2  # because corneas bulge
+            reach *= 1.2  # the island of a cornea extends farther
         of_island[(furthest < reach) & with_polygons] = number
         of_island[islands[own[number]]] = number
     if (of_island == 2).all():
@@ -207,7 +223,7 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
         controls: shape -> raw controls without prefix.
 
     Returns: the joint; and for each shape that turns the eye, its name -> the largest distance of a
-        vertex from its position after the rotation alone.
+        vertex from its position after the rigid motion alone.
     """
     turn = Turn(eye.joint, eye.ball.middle)
     left: dict[str, float] = {}
@@ -243,7 +259,7 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
 def look_turn(look: str) -> Doubles:
     """float64[3, 3]: the usual rotation of an eye by a look control, from the rest pose.
 
-    It multiplies column vectors with x to the left, y up and z to the front.
+    The matrix multiplies column vectors with x to the left, y up and z to the front.
 
     Args:
         look: key of LOOKS, the control's name without its side.
@@ -263,7 +279,8 @@ def jaw_turn(
     opening: Doubles,
     whole: Sequence[str],
 ) -> Turn | None:
-    """The jaw's joint at its hinge, with the rigid motion of the chin in each shape.
+    """The jaw's joint at its hinge, with the rigid motion of the chin in each shape that moves the
+    chin and has a single control: a jaw control, or any control if the shape is in `whole`.
 
     Returns None if the mouth opens without a rotation.
 

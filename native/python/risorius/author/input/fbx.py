@@ -44,7 +44,8 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     Returns: the mesh, and name of a blend shape -> displacements float64[V, 3].
 
     Raises:
-        ShapeFileError: the file has no mesh with blend shapes.
+        ShapeFileError: the file is no binary FBX, has no mesh with blend shapes or none of this
+            name, or the mesh is inconsistent.
         AnimationFileError: the file is damaged; the message names the place.
         BudgetError: the file contains more numbers than its size allows.
     """
@@ -88,7 +89,8 @@ def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
         number: object number of the mesh, from meshes_of().
 
     Raises:
-        AnimationFileError: the mesh is damaged; the message names the place.
+        ShapeFileError: the mesh is inconsistent; the message names the object.
+        AnimationFileError: packed bytes are damaged; the message names the place.
     """
     geometry = scene.objects[number]
     turn = _axes(scene) @ _to_world(scene, number)
@@ -203,6 +205,11 @@ def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], In
     """The vertices of each polygon, and of all corners concatenated.
 
     In the file, the last corner of a polygon is stored as ~index.
+
+    Args:
+        scene: the open file.
+        node: the mesh.
+        count: number of its vertices.
     """
     order = _numbers(scene, node, "PolygonVertexIndex").astype(np.int64)
     last = order < 0
@@ -215,7 +222,14 @@ def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], In
 
 def _uvs(scene: Scene, node: Node, count: int, corners: Ints) -> tuple[Doubles, Ints]:
     """The first UV layer of a mesh, and for each corner its index in the layer; zeros if
-    missing."""
+    missing.
+
+    Args:
+        scene: the open file.
+        node: the mesh.
+        count: number of its corners.
+        corners: int64[count], vertex of each corner.
+    """
     layer = node.first("LayerElementUV")
     if layer is None:
         return np.zeros((1, 2)), np.zeros(count, np.int64)

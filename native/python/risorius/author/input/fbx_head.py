@@ -30,7 +30,7 @@ def read_fbx_head(path: Path) -> list[HeadPart]:
         path: the file.
 
     Raises:
-        ShapeFileError: the file contains no mesh or is no binary FBX.
+        ShapeFileError: the file contains no mesh or is no binary FBX, or a mesh is inconsistent.
         AnimationFileError: the file is damaged; the message names the place.
         BudgetError: the file contains more numbers than its size allows.
     """
@@ -54,7 +54,8 @@ def read_fbx_head(path: Path) -> list[HeadPart]:
 def _by_materials(
     scene: Scene, path: Path, number: int, part: HeadPart, known: dict[int, Material]
 ) -> list[HeadPart]:
-    """The parts of a mesh, divided by materials; see islands.divided()."""
+    """The parts of a mesh: each connected piece gets the material of most of its polygons, and the
+    pieces of a material form a part, see islands.divided()."""
     owner = next((p for p, way in scene.parents.get(number, []) if not way), 0)
     listed = [i for i in scene.children.get(owner, []) if _is(scene, i, "Material")]
     for identity in listed:
@@ -70,7 +71,14 @@ def _is(scene: Scene, number: int, kind: str) -> bool:
 
 
 def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
-    """int64[faces]: index of each polygon's material in the node's materials; 0 if unknown."""
+    """int64[faces]: index of each polygon's material in the node's materials, 0 if unknown; an
+    empty array if the node has no materials.
+
+    Args:
+        mesh: the mesh.
+        faces: number of its polygons.
+        materials: number of materials of its node.
+    """
     layer = mesh.first("LayerElementMaterial")
     found = layer.array("Materials") if layer is not None else np.zeros(0)
     if materials < 1:
@@ -100,7 +108,15 @@ def _material(scene: Scene, path: Path, number: int) -> Material:
 def _add_picture(scene: Scene, path: Path, texture: int, role: str, out: Material) -> None:
     """Add the picture of a role to a material, or a note if the picture is not found.
 
-    The picture is embedded in the FBX, or in its folder, its .fbm folder or the folder textures.
+    The picture is embedded in the FBX, or in the folder of the FBX, in its .fbm folder or in the
+    folder textures beside it.
+
+    Args:
+        scene: the open file.
+        path: path of the FBX.
+        texture: object number of the texture.
+        role: color, normal or roughness.
+        out: the material; changed.
     """
     for video in scene.children.get(texture, []):
         content = scene.objects[video].first("Content") if _is(scene, video, "Video") else None

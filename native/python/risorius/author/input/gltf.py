@@ -41,8 +41,9 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     Returns: the mesh, and name of a morph target -> displacements float64[V, 3].
 
     Raises:
-        ShapeFileError: the file has no mesh with morph targets, or an unsupported kind of mesh.
-        AnimationFileError: the file is damaged; the message names the place.
+        ShapeFileError: the file is no glTF, or has no mesh with morph targets or none of this name.
+        AnimationFileError: the file is damaged, or the mesh is not made of lists of triangles; the
+            message names the place.
         BudgetError: the file contains more numbers than its size allows.
     """
     document = open_document(path)
@@ -157,7 +158,11 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
     counts = {len(part.deltas) for part in parts}
     if len(counts) != 1:
         raise document.fail(
-            place, f"as many morph targets in all primitives were expected, found {sorted(counts)}"
+            place,
+            (
+                "as many morph targets in all primitives as in the first were expected, found "
+                f"{sorted(counts)}"
+            ),
         )
     names = _names(row, counts.pop())
     corners = np.concatenate(triangles)
@@ -325,7 +330,15 @@ def _uvs(
     given: Mapping[str, Any],
     count: int,
 ) -> Doubles:
-    """float64[V, 2]: texture coordinates of the colour texture, v up; zeros if there are none."""
+    """float64[V, 2]: texture coordinates of the colour texture, v up; zeros if there are none.
+
+    Args:
+        document: the open file.
+        primitive: the primitive, with the number of its material.
+        packed: reads the attributes.
+        given: the attributes of the primitive: name -> accessor.
+        count: number of its vertices.
+    """
     texture = _texture(document, primitive)
     extensions = texture.get("extensions")
     change = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
@@ -381,8 +394,8 @@ def _names(row: Mapping[str, Any], count: int) -> list[str]:
 def _node_matrix(document: Document, mesh: int) -> Doubles:
     """float64[4, 4]: matrix from a mesh to the world.
 
-    It is the matrix of the first node with the mesh. If this node has a skin, the bind pose
-    determines the matrix. It is the identity if no node has the mesh.
+    The result is the matrix of the first node with the mesh. If this node has a skin, the bind pose
+    determines the matrix instead. The result is the identity if no node has the mesh.
     """
     world = _World(document)
     found = world.of_mesh(mesh)

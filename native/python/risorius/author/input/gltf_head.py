@@ -31,11 +31,13 @@ _KINDS = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp"}
 def read_gltf_head(path: Path) -> list[HeadPart]:
     """Read the meshes of a glTF, in metres with y up.
 
+    Primitives that are not lists of triangles are left out.
+
     Args:
         path: the file.
 
     Raises:
-        ShapeFileError: the file contains no mesh or an unsupported kind of mesh.
+        ShapeFileError: the file is no glTF or contains no triangles.
         AnimationFileError: the file is damaged; the message names the place.
         BudgetError: the file contains more numbers than its size allows.
     """
@@ -67,7 +69,8 @@ def _free(name: str, taken: set[str]) -> str:
 
 def _places(document: Document, number: int, row: Mapping[str, Any]) -> list[tuple[str, Doubles]]:
     """For each node that shows mesh `number`: its name, and the matrix float64[4, 4] from the first
-    of these nodes to this node. Skinned or unused meshes give one entry with the identity."""
+    of these nodes to this node. Skinned or unused meshes give one entry with the identity. A single
+    entry has the mesh's name."""
     nodes = document.json.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
     own = gltf.name_of(document, row, number)
@@ -100,12 +103,13 @@ def _placed(part: HeadPart, turn: Doubles) -> HeadPart:
 def _parts(
     document: Document, number: int, source: str, materials: dict[int, Material]
 ) -> list[HeadPart]:
-    """The parts of a mesh, divided by materials; see islands.divided()."""
+    """The parts of a mesh: each connected piece gets the material of most of its polygons, and the
+    pieces of a material form a part, see islands.divided()."""
     row = document.json["meshes"][number]
     groups: dict[int, list[dict[str, Any]]] = {}
     for primitive in gltf.primitives(document, row, number):
         kind = primitive.get("material")
-        if primitive.get("mode", 4) == 4:  # triangles; points and lines are left out
+        if primitive.get("mode", 4) == 4:  # lists of triangles; strips, lines, points are left out
             groups.setdefault(kind if isinstance(kind, int) else -1, []).append(primitive)
     if not groups:
         return []

@@ -208,7 +208,13 @@ def own_control(name: str) -> str:
 
 
 def _own(name: str, expression: str, taken: Container[str]) -> str:
-    """An unused control name of ASCII letters, digits and _, made from a shape's name."""
+    """An unused control name of ASCII letters, digits and _, made from a shape's name.
+
+    Args:
+        name: name of the shape.
+        expression: name that is used if the shape's name has no letter or digit; "": shape.
+        taken: names in use.
+    """
     plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
     return _numbered(plain if plain.strip("_") else expression or "shape", taken)
 
@@ -217,6 +223,11 @@ def _free(expression: str, name: str, taken: Mapping[str, str]) -> str:
     """The expression's name, or a name from the shape if another shape has the expression.
 
     Upper and lower case count as equal, because names become files.
+
+    Args:
+        expression: name of the expression.
+        name: name of the shape.
+        taken: shape -> its expression, for the shapes that have one already.
     """
     used = {found.casefold() for found in taken.values()}
     if expression.casefold() not in used:

@@ -21,7 +21,8 @@ _ROLES = {"map_kd": "color", "norm": "normal", "map_pr": "roughness"}
 
 
 def with_materials(path: Path, part: HeadPart) -> list[HeadPart]:
-    """Divide the mesh of an OBJ file by materials; see islands.divided().
+    """Divide the mesh of an OBJ file by materials: each connected piece gets the material of most
+    of its polygons, see islands.divided().
 
     Args:
         path: the OBJ file.

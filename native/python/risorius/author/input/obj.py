@@ -37,7 +37,8 @@ def read_obj(path: Path) -> ObjMesh:
     """Read the mesh of an OBJ file. Groups, materials and normals are ignored.
 
     Raises:
-        ShapeFileError: a line of a vertex or polygon is invalid; the message has its number.
+        ShapeFileError: a line of a vertex or polygon is invalid (the message has the number of the
+            line), there are no vertices or polygons, or the file has another known format.
         OSError: the file cannot be read.
     """
     positions: list[list[float]] = []

@@ -19,9 +19,11 @@ _NEUTRAL = ("neutral", "basis", "base", "rest", "default", "head", "face")
 def find_neutral(folder: Path) -> Path:
     """Find the file of the neutral mesh in a folder by its name.
 
+    The words neutral, basis, base, rest, default, head and face are tried in this order. A word
+    finds the file with this name, or else the only file with the word in its name.
+
     Raises:
-        ShapeFileError: no file is named like a word of _NEUTRAL, and each of these words is part
-            of no file name or of several.
+        ShapeFileError: no word finds a file.
     """
     files = {path.stem.lower(): path for path in sorted(folder.glob("*.obj"))}
     for word in _NEUTRAL:
@@ -30,8 +32,8 @@ def find_neutral(folder: Path) -> Path:
         if exact is not None or len(named) == 1:
             return exact or named[0]
     raise ShapeFileError(
-        f"{folder}: an OBJ file called {', '.join(_NEUTRAL)} was expected beside those of the "
-        f"expressions, found {len(files)} others"
+        f"{folder}: an OBJ file called {', '.join(_NEUTRAL)} was expected beside the OBJ files of "
+        f"the expressions, found {len(files)} other files"
     )
 
 

@@ -40,20 +40,25 @@ def meaning_of(value: Said) -> SaidMeaning:
     """The controls or the expression that an entry of the table [controls] means.
 
     Raises:
-        GivenError: the ARKit unit is unknown, or the name of an expression is invalid.
+        GivenError: the ARKit unit is unknown, the name of an expression is invalid, or an
+            expression is listed together with other meanings.
     """
     given = [value] if isinstance(value, str) else value
     if len(given) == 1 and given[0].startswith("@"):
         name = given[0][1:]
         if not _NAME.fullmatch(name):
             raise GivenError(
-                f"letters, digits, _ and - were expected of an expression, found {shown(name)}"
+                "letters, digits, _ and - were expected in the name of an expression, found "
+                f"{shown(name)}"
             )
         return SaidMeaning((), name)
     controls: list[str] = []
     for part in given:
         if part.startswith("@"):
-            raise GivenError(f"an expression alone or controls were expected, found {shown(given)}")
+            raise GivenError(
+                "an expression alone or controls, but not both, were expected, found "
+                f"{shown(given)}"
+            )
         controls += _controls(part)
     return SaidMeaning(tuple(dict.fromkeys(controls)), "")
 
@@ -68,7 +73,7 @@ def _controls(part: str) -> list[str]:
 
 
 def check(value: object) -> Said:
-    """Check a value of the table and return it. Raises GivenError if it is invalid."""
+    """Check a value of the table [controls] and return it. Raises GivenError if it is invalid."""
     found: Said = list(several(value, of=text)) if isinstance(value, list) else text(value)
     meaning_of(found)
     return found

@@ -158,7 +158,10 @@ def read_options(path: Path) -> tuple[RigOptions, CorrectiveOptions]:
     table = _read_tables(path)
     for name in ("source", "controls", "name"):
         if name in table:
-            raise ShapeFileError(f"{path}: {name}: a person of the sample has its own")
+            raise ShapeFileError(
+                f"{path}: {name}: a person of the sample has its own, so this file may contain "
+                "options only"
+            )
     return _options(path, table), _correctives(table.get("correctives", {}))
 
 
@@ -230,6 +233,7 @@ def read_face(spec: Spec) -> Read:
     Raises:
         DnaError: the DNA file is damaged.
         ShapeFileError: a mesh or an expression is unusable.
+        RisoriusError: another fault of the file, for example no expression moves a vertex.
         OSError: a file cannot be read.
     """
     folder = spec.path.parent

@@ -103,6 +103,11 @@ def _pairs(points: Doubles, rim: Ints, same: float) -> list[tuple[Ints, Ints]]:
 
     Eight grids are used, shifted by half a cell along every combination of axes, so that two close
     vertices share a cell in at least one grid.
+
+    Args:
+        points: float64[V, 3], vertex positions.
+        rim: indices of the vertices on open edges.
+        same: tolerance of equal positions; a cell has four times this size.
     """
     out = []
     cell = 4 * same

@@ -139,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
         require_suffix(args.report, (".html",), "--report")
         fileio.check_writable(args.report)
         if args.report.resolve() == args.out.resolve():
-            raise CommandLineError("author: another file than that of -o was expected of --report")
+            raise CommandLineError("author: --report: another file than that of -o was expected")
         need_plot()
     options = replace(options, kept=(*options.kept, *read.kept))
     source = dna
@@ -228,7 +228,8 @@ def _options(spec: Spec, args: argparse.Namespace) -> RigOptions:
 
 
 def _size(spec: Spec, args: argparse.Namespace) -> None:
-    """Replace the head size of the spec by --height-mm or --scale, if one is given."""
+    """Replace the head size of the spec by --height-mm or --scale, if one is given; with --onto the
+    spec stays unchanged."""
     said = {"height_mm": args.height_mm, "scale": args.scale}
     said = {name: value for name, value in said.items() if value is not None}
     if args.onto is not None:
@@ -343,7 +344,7 @@ def as_json(rig: JointRig) -> dict[str, object]:
 
 
 def as_lines(rig: JointRig) -> list[str]:
-    """The errors of each mesh as lines of a table.
+    """Lines of text with the errors of each LOD, of each mesh at LOD 0, and of the combinations.
 
     Args:
         rig: the finished rig.

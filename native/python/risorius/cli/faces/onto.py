@@ -31,7 +31,7 @@ _OWN = (
     "write_landmarks",
     "mesh",
     "rig",
-)  # options that need --onto
+)  # options that have no effect without --onto or --conform
 
 
 class Clock(Protocol):
@@ -103,11 +103,14 @@ def check_arguments(args: argparse.Namespace) -> None:
         given = [name for name in _OWN if getattr(args, name) is not None]
         if given:
             raise CommandLineError(
-                f"author: --{given[0].replace('_', '-')} is of --onto HEAD, which is missing"
+                f"author: --{given[0].replace('_', '-')} is of --onto HEAD, which is missing: "
+                "the option works only with it"
             )
         return
     if args.names is not None:
-        raise CommandLineError("author: --names is of a head with expressions, and not of --onto")
+        raise CommandLineError(
+            "author: --names is of a head with expressions and is not possible with --onto"
+        )
     if args.out is None:
         raise CommandLineError("author: -o OUT.dna was expected")
     if args.spec is not None and args.spec.suffix.lower() not in (".dna", ".json"):

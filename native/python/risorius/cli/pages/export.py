@@ -124,9 +124,9 @@ def run(args: argparse.Namespace) -> int:
     refuse_same_file(str(args.file), str(out))
     require_writable(out)
     if args.licence and not args.vrm:
-        raise CommandLineError("--licence is of a VRM: add --vrm 1.0 or --vrm 0.x")
+        raise CommandLineError("--licence is of a VRM file: add --vrm 1.0 or --vrm 0.x")
     if args.takes and args.within is None:
-        raise CommandLineError("--takes is for combinations: add --within, such as --within 0.5")
+        raise CommandLineError("--takes needs combinations: add --within, such as --within 0.5")
     _check_body(args, out)
     said = licence.read(args.licence, args.vrm) if args.licence else {}
     default = "vrm,arkit" if args.vrm else "arkit,visemes"
@@ -159,12 +159,18 @@ def run(args: argparse.Namespace) -> int:
 def _check_body(args: argparse.Namespace, out: Path) -> None:
     """Check the options of the skeleton. Raises: CommandLineError: options exclude each other."""
     if args.no_skeleton and (args.vrm or args.humanoid or args.body):
-        raise CommandLineError("--no-skeleton: a VRM, a humanoid, and a body have a skeleton")
+        raise CommandLineError(
+            "--no-skeleton is not possible with --vrm, --humanoid or --body, because these need "
+            "a skeleton"
+        )
     if args.body is None:
         if args.without or args.body_scale is not None:
             raise CommandLineError("--without and --body-scale need a body: add --body BODY.glb")
         return
     if args.humanoid:
-        raise CommandLineError("--humanoid adds bones of a body: leave it or --body out")
+        raise CommandLineError(
+            "--humanoid is not possible with --body, because both give the bones of a body: "
+            "leave it or --body out"
+        )
     require_suffix(args.body, SUFFIXES, "--body")
     refuse_same_file(str(args.body), str(out))

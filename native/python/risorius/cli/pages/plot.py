@@ -47,7 +47,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Check the options before the file is opened. Raises: CommandLineError."""
+    """Check the options before the file is opened. Raises: CommandLineError; InputError if the
+    output cannot be written."""
     require_suffix(args.out, (".html", ".png"), "-o")
     require_writable(args.out)
 

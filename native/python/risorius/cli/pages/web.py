@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     require_writable(out)
     if args.sound is not None:
         if args.clip is None:
-            raise CommandLineError("--sound: it goes with a clip: --clip TAKE")
+            raise CommandLineError("--sound: it goes with a clip: add --clip TAKE")
         require_suffix(args.sound, SOUNDS, "--sound")
     lods = _lods(args.lods)
     empty_page()  # a build without the page fails here, before it reads the file

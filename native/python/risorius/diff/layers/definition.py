@@ -66,7 +66,15 @@ def _joints(faces: Comparison, place: Place) -> None:
 
 
 def _moved(place: Place, verb: str, kind: str, labels: list[str], a: Floats, b: Floats) -> None:
-    """Report a line per joint whose neutral pose changed, the largest change first."""
+    """Report a line per joint whose neutral pose changed, the largest change first.
+
+    Args:
+        place: where the differences are reported.
+        verb: word for the change, such as "moved".
+        kind: "length" or "angle", for the unit.
+        labels: names of the changed joints.
+        a, b: float32[n, 3], neutral translation or rotation of these joints in each face.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.linalg.norm(a.astype(np.float64) - b, axis=1)
     for i in np.argsort(-np.nan_to_num(apart, nan=np.inf), kind="stable").tolist():

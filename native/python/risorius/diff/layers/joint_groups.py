@@ -60,7 +60,15 @@ def _group(place: Place, a: risorius.JointGroup, b: risorius.JointGroup) -> None
 
 
 def _values(place: Place, a: Floats, b: Floats, rows: Pairs, columns: Pairs, numbers: Ints) -> None:
-    """Report changed values, matched by joint attribute and control."""
+    """Report changed values, matched by joint attribute and control.
+
+    Args:
+        place: where the difference is reported.
+        a, b: float32[rows, columns], the values of the group in each face.
+        rows: matched rows of both groups.
+        columns: matched columns of both groups.
+        numbers: int64[rows of A], common numbers of the joint attributes of the rows.
+    """
     x, y = cut(a, rows.a, columns.a), cut(b, rows.b, columns.b)
     changed = place.faces.changed(x, y)
     if not changed.any():
@@ -75,7 +83,14 @@ def _values(place: Place, a: Floats, b: Floats, rows: Pairs, columns: Pairs, num
 
 
 def _amounts(faces: Comparison, a: Floats, b: Floats, changed: Bools, kinds: Ints) -> str:
-    """The largest changes as text, e.g. "by up to 0.3 mm and by up to 2 degrees"."""
+    """The largest changes as text, e.g. "by up to 0.3 mm and by up to 2 degrees".
+
+    Args:
+        faces: both rigs.
+        a, b: float32[n, m], matched values of each face.
+        changed: bool[n, m], the values that differ.
+        kinds: int64[n], 0 for rows of translation, 1 for rotation, 2 for scale.
+    """
     parts = []
     for kind, measure in enumerate(("length", "angle", "number")):
         mask = changed & (kinds == kind)[:, None]

@@ -74,8 +74,10 @@ def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
 def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
     """Match the joints of faces a and b.
 
-    Joints are matched by name. Unmatched joints with the same parent and neutral pose, then
-    unmatched joints with the same index and neutral pose, count as renamed.
+    Joints are matched by name. An unmatched joint of each face counts as renamed if their parents
+    match, their neutral poses are equal, and neither face has another such joint. If both faces
+    have the same number of joints, unmatched joints with the same index and neutral pose also count
+    as renamed.
     """
     pairs = pair_names(a.joint_names, b.joint_names)
     neutral_a, neutral_b = _neutral(a), _neutral(b)
@@ -96,7 +98,8 @@ def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
 
 
 def _neutral(dna: risorius.Dna) -> list[bytes]:
-    """The neutral translation and rotation of each joint as bytes, rounded to 4 decimals."""
+    """The neutral translation and rotation of each joint as bytes, rounded to 4 decimals; the index
+    of the joint if the face does not have one translation and rotation for each joint."""
     both = [dna.neutral_joint_translations, dna.neutral_joint_rotations]
     count = len(dna.joint_names)
     if any(len(values) != count for values in both):
@@ -106,7 +109,8 @@ def _neutral(dna: risorius.Dna) -> list[bytes]:
 
 
 def _parents(dna: risorius.Dna) -> Ints:
-    """The parent of each joint, int64[joints]; 0xFFFF for roots."""
+    """The parent of each joint, int64[joints]; 0xFFFF for roots, and for all joints if the face
+    does not have one parent for each joint."""
     count = len(dna.joint_names)
     parents = integers(dna.joint_parents)
     if len(parents) != count:

@@ -52,8 +52,9 @@ class BodyMesh:
     Attributes:
         name: name of the node; the mesh's name if the node has none.
         also: name of the mesh.
-        joints: numbers of the nodes that are the joints of its skin.
-        pieces: its primitives.
+        joints: numbers of the nodes that are the joints of its skin; without a skin, the number of
+            the node that moves it.
+        pieces: its primitives that have vertices.
         targets: names of its morph targets.
     """
 
@@ -184,7 +185,7 @@ class Meshes:
             out[name] = values[name].astype("<u2")
         places = np.einsum("vij,vj->vi", linear, values["POSITION"]) + blended[:, :3, 3]
         if not np.isfinite(places).all() or np.abs(places).max(initial=0.0) > 1e6:
-            raise document.fail(at, "vertices nearer than 1,000 km were expected")
+            raise document.fail(at, "vertices within 1,000 km of the origin were expected")
         out["POSITION"] = places.astype("<f4")
         turn = _cofactors(linear)
         if "NORMAL" in values:
@@ -268,7 +269,8 @@ class _Lists:
 
 def _blended(document: Document, values: dict[str, Doubles], moves: Doubles, at: str) -> Doubles:
     """float64[V, 4, 4], per vertex the matrix from the mesh's coordinates to the scene: the mean of
-    `moves` by skin weights. Normalises the weights in `values`.
+    `moves` by skin weights. Normalises the weights in `values`; without weights, all vertices get
+    the weight 1 on the first joint.
     """
     count = len(values["POSITION"])
     sets = [name[8:] for name in values if name.startswith("WEIGHTS_")]

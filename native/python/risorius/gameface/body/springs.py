@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads the swinging chains of a VRM body, such as a skirt, for the nodes of the exported file."""
+"""Converts the swinging chains of a VRM body, such as a skirt's, to the exported file's nodes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ class _Reader:
         self._down = np.diag(body.to_scene)[:3] / body.scale * flip
 
     def new(self, table: Mapping[str, Any]) -> Springs:
-        """Read the chains from VRM 1.0's table VRMC_springBone."""
+        """Read the chains from VRM 1.0's table VRMC_springBone. The numbers of a chain, such as its
+        stiffness, are those of its first joint, although VRM allows others for each joint."""
         at = "VRMC_springBone"
         colliders = [
             self._collider(row, f"{at}.colliders[{i}]")
@@ -160,7 +161,14 @@ class _Reader:
     def _named(
         self, row: Mapping[str, Any], groups: list[list[int]], count: int, place: str
     ) -> list[int]:
-        """Indices of the colliders in the groups to which a chain's row refers."""
+        """Indices of the colliders in the groups to which a chain's row refers.
+
+        Args:
+            row: table of the chain.
+            groups: for each collider group, the indices of its colliders.
+            count: number of colliders.
+            place: name of the row for errors.
+        """
         found = row.get("colliderGroups")
         out = list[int]()
         for group in found if isinstance(found, list) else []:

@@ -15,7 +15,7 @@ from ..avatar import humanoid
 
 Doubles = npt.NDArray[np.float64]
 
-_MOST = 20_000  # nodes of a file
+_MOST = 20_000  # largest number of nodes of a file
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,15 @@ class Tree:
 
 
 def find_tree(document: Document) -> Tree:
-    """The nodes of the first scene, or all nodes if the file has no scene.
+    """The nodes of the file's default scene (the first one if the file names none), or all nodes if
+    the file has no scene.
 
     Args:
         document: the file of the body.
 
     Raises:
-        AnimationFileError: there are no nodes, a node has two parents or is its own ancestor, or a
-            position is not a list of numbers.
+        AnimationFileError: there are no nodes or more than 20,000, a node has two parents or is its
+            own ancestor, or a position is not a list of numbers.
     """
     rows = document.json.get("nodes")
     if not isinstance(rows, list) or not rows:

@@ -23,13 +23,15 @@ Ints = npt.NDArray[np.int64]
 HANGS = 0.04  # metres between the root and the tip of a card that swings
 _BUNDLES = 12
 _SEGMENT = 0.05  # metres between joints
-_JOINTS = (2, 4)
+_JOINTS = (2, 4)  # fewest and most joints of a chain
 _WIDEST = 0.15  # metres: a wider piece is hair in one piece, which no chain can follow
-_BAND = 0.015  # metres above and below a joint whose hair it lies in
-_FIRM = 0.3  # share of a card, from its root, over which it begins to swing
-_FEWEST = 12  # roots that a sphere is fitted to
-_SKULL = (0.05, 0.11)  # metres, radius
-_HIT = 0.01  # metres, radius of a joint
+# metres: vertices this far above or below a joint have weight 1/e in the mean that places the joint
+_BAND = 0.015
+# fraction of a card's height, from its root, in which the weight passes from the head to the chain
+_FIRM = 0.3
+_FEWEST = 12  # smallest number of hair roots to which a sphere is fitted
+_SKULL = (0.05, 0.11)  # metres: smallest and largest radius of the skull's sphere
+_HIT = 0.01  # metres: radius of the sphere around a joint that collides with the skull
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,8 @@ class Cards:
 
 
 def is_long(points: Doubles, triangles: Ints) -> bool:
-    """Whether a mesh of hair has a card that hangs farther than HANGS below its root.
+    """Whether a mesh of hair has a card less than 15 cm wide whose tip is more than HANGS (4 cm)
+    below its root.
 
     Args:
         points: float64[V, 3], metres, y up.
@@ -186,7 +189,12 @@ def _bundle(away: Doubles) -> Ints:
 
 
 def _skull(roots: Doubles, head: Doubles) -> tuple[Doubles, float]:
-    """Centre and radius in metres of a sphere for the skull, fitted to the hair roots."""
+    """Centre and radius in metres of a sphere for the skull, fitted to the hair roots.
+
+    Args:
+        roots: float64[n, 3], the root of each hair card in metres.
+        head: float64[3], position of the head's joint in metres.
+    """
     guess = head + np.array([0.0, 0.07, 0.0])
     if len(roots) < _FEWEST:
         return guess, 0.08
@@ -205,6 +213,11 @@ def _line(
     """float64[n, 3], joints of a bundle at evenly spaced heights.
 
     Each joint is at the mean position of the bundle's hair near its height.
+
+    Args:
+        hairs: the meshes.
+        cards: the hair cards of each mesh.
+        members: for each mesh, bool[cards], whether a card belongs to the bundle.
     """
     picked = list(zip(hairs, cards, members, strict=True))
     top = float(np.mean(np.concatenate([one.root[member] for _, one, member in picked])))
@@ -222,7 +235,15 @@ def _line(
 def _woven(
     hair: Hair, cards: Cards, member: npt.NDArray[np.bool_], chain: list[int], heights: Doubles
 ) -> Hair:
-    """Hair in which the cards of one bundle have skin weights of the bundle's chain."""
+    """Hair in which the cards of one bundle have skin weights of the bundle's chain.
+
+    Args:
+        hair: the mesh.
+        cards: its hair cards.
+        member: bool[cards], whether a card belongs to the bundle.
+        chain: indices of the bundle's joints, from the root to the tip.
+        heights: float64[joints], heights of these joints in metres.
+    """
     vertices = np.flatnonzero(member[cards.of_vertex])
     if not len(vertices):
         return hair
@@ -238,7 +259,8 @@ def _woven(
     dense = np.zeros((len(vertices), max(INFLUENCES, chain[-1] + 1)))
     pulled = np.zeros_like(dense)
     for number, weight in ((upper, (1 - part) * share), (lower, part * share)):
-        # Number -1 means hair above the first joint, which keeps the weights of the head.
+        # Above the middle between the first two joints there is no upper joint (number -1): the
+        # upper part of the weight stays with the head, and the first joint gets the lower part.
         np.add.at(pulled, (every, np.array(chain)[number]), np.where(number < 0, 0.0, weight))
     for k in range(hair.joints.shape[1]):
         np.add.at(dense, (every, hair.joints[vertices, k]), hair.weights[vertices, k])

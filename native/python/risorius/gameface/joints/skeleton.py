@@ -132,7 +132,7 @@ def _own(dna: Dna, *, is_body: bool) -> dict[str, int]:
 
 
 def _humanoid(found: Mapping[str, int], kind: str) -> tuple[list[str], list[str]]:
-    """The bones of a humanoid, and the parent of each.
+    """The bones of a humanoid, both found and added ones, and the parent of each.
 
     Raises:
         GameFaceError: needed bones are missing, and `kind` does not add them.

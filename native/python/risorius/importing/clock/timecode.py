@@ -62,9 +62,11 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
 def infer_base(codes: Sequence[Timecode]) -> int | None:
     """Frames per second that the timecodes count, or None if it cannot be inferred.
 
-    A rate measured from the timecodes wins. It cannot be measured if the timecodes never reach the
-    next second, or if too many rows are lost around each new second. Then the largest frame number
-    decides, provided that only one usual rate fits it.
+    If every frame number is 0, the result is 30, because any rate gives the same times. Else a rate
+    measured from the timecodes wins. It cannot be measured if the timecodes never reach the next
+    second, or if too many rows are lost around each new second. Then the largest frame number
+    decides: 30 to 59 means 60 frames per second, 29 in a take of 2 s or more means 30, and other
+    numbers give None.
     """
     frames = np.array([code.frames for code in codes])
     seconds = np.array([3600 * c.hours + 60 * c.minutes + c.seconds for c in codes])
@@ -89,6 +91,11 @@ def _measured(
 
     The frame number drops by the frames per second minus one step. Lost rows reduce the drop, so an
     unusual rate is accepted only if several drops agree or no rows are lost.
+
+    Args:
+        frames: float64[codes], frame number of each timecode.
+        seconds: int[codes], whole seconds since midnight of each timecode.
+        largest: largest frame number, which the result must exceed.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]
@@ -115,14 +122,16 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     Args:
         codes: from `parse`, in the order of the frames.
         base: frames per second that the timecode counts: 30 for 29.97.
-        is_true_rate: False if a second of timecode lasts 1.001 s, as at 23.976, 29.97, 59.94.
+        is_true_rate: False if a second of timecode lasts 1.001 s, as at 23.976, 29.97, 59.94. It
+            is ignored if any timecode is drop-frame: a second then lasts 1.001 s.
 
     Returns:
         float64[codes].
     """
     hours, minutes, secs, frames, dropped = np.array(codes, np.float64).reshape(-1, 5).T
     count = (3600.0 * hours + 60.0 * minutes + secs) * base + frames
-    # Drop-frame skips the first 2 of 30 frame numbers (4 of 60) in each minute except every tenth.
+    # Drop-frame skips the first 2 frame numbers of each minute (4 at 60 frames per second), except
+    # in every tenth minute.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)

@@ -47,7 +47,7 @@ _NAMES: dict[str, str] = {
     **{f"{word}in{unit}": of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{unit: _UNIT_OF[unit] for unit in _ALONE},
     **dict.fromkeys(_FRAME_NUMBERS, FRAMES),
-    # These come last, to replace entries with equal keys: "times" is not "time" with unit "s".
+    # These entries are last, because they replace equal keys: "times" is not "time" with unit "s".
     **dict.fromkeys([*_WORDS, "t", "ts"], ""),
 }
 # Texts in brackets in the header of frame numbers, as in "frame (no)", that are no unit of time.
@@ -148,7 +148,8 @@ def seconds_of(
         values: float64[frames], as in the file.
         said: unit in the header.
         asked: the caller's options; the caller of this function handles `counts_rows`.
-        notes: receives a sentence if a unit is assumed.
+        notes: receives a sentence if a unit other than seconds is inferred, and if dates are
+            counted from the first frame.
         name: the file's name in errors.
         column: column of the times, for errors.
 
@@ -187,7 +188,16 @@ def seconds_of(
 
 
 def _shown(values: Doubles, name: str, column: str | None) -> str:
-    """Infers the unit of times from their size and steps. Raises: AnimationFileError: none fits."""
+    """Infers the unit of times from their size and steps.
+
+    Args:
+        values: float64[frames], times as in the file.
+        name: the file's name in errors.
+        column: column of the times, for errors.
+
+    Raises:
+        AnimationFileError: none fits.
+    """
     smallest = float(values.min(initial=np.inf))
     for unit, least in _DATES:
         if np.isfinite(smallest) and smallest > least:

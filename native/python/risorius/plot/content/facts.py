@@ -73,7 +73,7 @@ def gather(dna: risorius.Dna, data: bytes, file_name: str, title: str | None = N
         dna: the face, loaded from `data` with all layers.
         data: bytes of the file, from which sizes are read.
         file_name: file name without folder, for display.
-        title: displayed title; None: the character's name.
+        title: displayed title; None: the character's name, or the file name if there is none.
     """
     regions = regions_of(dna.joint_names)
     return Facts(

@@ -42,6 +42,8 @@ class Block:
 def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
     """The region of each joint group: the region to which most joints of the group belong.
 
+    Joints of the region "other" do not count, unless all joints of the group are of this region.
+
     Args:
         dna: the face.
         joint_regions: region of each joint.

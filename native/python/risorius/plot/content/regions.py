@@ -67,11 +67,12 @@ def regions_of(joints: Iterable[str]) -> list[str]:
 def majority(indices: Iterable[int], regions: Sequence[str]) -> str:
     """The region that most of the joints have; on a tie the first one in REGIONS.
 
+    "other" is returned only if no joint has another region.
+
     Args:
         indices: indices of joints; indices out of range are ignored.
         regions: region of each joint.
     """
     votes = Counter(regions[i] for i in indices if 0 <= i < len(regions))
     named = [region for region in REGIONS[:-1] if votes[region]]
-    # The last of REGIONS, "other", does not take part in the vote.
     return max(named, key=lambda region: votes[region]) if named else "other"

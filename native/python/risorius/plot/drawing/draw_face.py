@@ -36,7 +36,14 @@ _MARGIN = 0.04
 
 @dataclass(frozen=True)
 class Scene:
-    """The data of one view, in view axes (right, up, front) and file units."""
+    """The data of one view, in view axes (right, up, front) and file units.
+
+    Attributes:
+        shape: the meshes.
+        joints: float64[J, 3], positions of all joints.
+        shown: indices of the joints that are drawn.
+        bones: int64[n, 2], parent and child of each drawn bone.
+    """
 
     shape: shade.Surface
     joints: Floats
@@ -75,7 +82,13 @@ def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]
 
 
 def _paint(name: str, mesh: risorius.Mesh, axes: Floats) -> Floats:
-    """float64[V]: lightness of each vertex; an eyeball gets an iris and a pupil."""
+    """float64[V]: lightness of each vertex; an eyeball gets an iris and a pupil.
+
+    Args:
+        name: name of the mesh.
+        mesh: the mesh.
+        axes: float64[3, 3], maps file axes to right, up, front.
+    """
     points = np.asarray(mesh.positions, float).reshape(-1, 3) @ axes
     tone = np.ones(len(points))
     if not name.lower().startswith("eye") or not len(points):

@@ -107,8 +107,8 @@ def _draw_row_owners(axes: Axes, facts: Facts, rows: int) -> None:
         lines.append([(0, 9 * first), (axes.get_xlim()[1], 9 * first)])
     patches = PatchCollection(stripes, facecolor=colors, edgecolor="none", clip_on=False)
     axes.add_collection(patches, autolim=False)
-    # More than 100 lines are not drawn, because they would hide the coefficients. There is
-    # a line wherever the joint group of the rows changes.
+    # There is a line wherever the joint group of the rows changes. If there are more than 100
+    # lines, none is drawn, because they would hide the coefficients.
     if len(lines) <= 100:
         axes.add_collection(LineCollection(lines, colors=MUTED, linewidths=0.35), autolim=False)
     axes.tick_params(axis="y", pad=9)
@@ -174,7 +174,12 @@ def _draw_regions(
 
 
 def _apart(places: list[float], gap: float) -> list[float]:
-    """Ascending positions from 0 to 1, moved as little as needed to be `gap` apart."""
+    """The positions, moved so that neighbours are at least `gap` apart.
+
+    Args:
+        places: ascending positions from 0 to 1.
+        gap: smallest distance.
+    """
     moved: list[float] = []
     for y in places:
         moved.append(max(y, moved[-1] + gap) if moved else max(y, gap / 2))

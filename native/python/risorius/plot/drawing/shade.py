@@ -60,7 +60,8 @@ def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> 
 
     Args:
         meshes: the meshes.
-        paints: paint of each mesh, see Surface.
+        paints: for each mesh, float64[V], a lightness per vertex, or float64[V, 3], a colour per
+            vertex; the colour of clay is multiplied by it.
         axes: float64[3, 3], from skeleton.view_axes: maps file axes to right, up, front.
     """
     points, triangles, paint, first = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], [], 0
@@ -84,7 +85,7 @@ def vertex_normals(points: Floats, triangles: Ints) -> Floats:
         triangles: int64[F, 3].
 
     Returns:
-        float64[V, 3] of length 1, or 0 if no triangle has an area.
+        float64[V, 3] of length 1, or 0 for a vertex whose triangles have no area.
     """
     a, b, c = (points[triangles[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
@@ -173,7 +174,14 @@ def _slopes(corners: Floats) -> Floats:
 def _rows(
     screen: Floats, triangles: Ints, slopes: Floats, size: tuple[int, int]
 ) -> tuple[Ints, Ints, Ints, Ints]:
-    """The rows of pixels of all triangles: triangle, y, first x and number of pixels per row."""
+    """The rows of pixels of all triangles: triangle, y, first x and number of pixels per row.
+
+    Args:
+        screen: float64[V, 3], vertices in pixels, y down.
+        triangles: int64[F, 3], vertices of the triangles.
+        slopes: float64[F, 3, 3], coefficients of the barycentric weights.
+        size: height and width of the picture in pixels.
+    """
     high, wide = size
     y = screen[triangles, 1]
     first = np.clip(np.ceil(y.min(axis=1, initial=high)), 0, high).astype(np.int64)
@@ -209,7 +217,12 @@ def _batches(
 
 
 def _lit(normals: Floats, paint: Floats) -> Floats:
-    """float64[N, 3]: colours of clay under two soft lights, on both sides of a surface."""
+    """float64[N, 3]: colours of clay under two soft lights, on both sides of a surface.
+
+    Args:
+        normals: float64[N, 3], normals in view axes, of any length.
+        paint: float64[N] or float64[N, 3], factor on the colour of clay.
+    """
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(length > 0, length, 1)
     normals = normals * np.where(normals[:, 2:] < 0, -1, 1)
@@ -223,7 +236,12 @@ def _lit(normals: Floats, paint: Floats) -> Floats:
 
 
 def _averaged(picture: Floats, smooth: int) -> npt.NDArray[np.uint8]:
-    """Averages blocks of samples to pixels; only covered samples count for the colour."""
+    """Averages blocks of samples to pixels; only covered samples count for the colour.
+
+    Args:
+        picture: float64[h, w, 4], samples as RGBA.
+        smooth: samples per pixel in each direction.
+    """
     high, wide = picture.shape[0] // smooth, picture.shape[1] // smooth
     blocks = picture.reshape(high, smooth, wide, smooth, 4)
     alpha = blocks[..., 3].mean(axis=(1, 3))
