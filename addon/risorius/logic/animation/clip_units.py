@@ -16,7 +16,8 @@ Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 NECK = ("neck.yaw", "neck.pitch", "neck.roll")
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
-# Offset of the gaze target from its rest place, in Blender units and in the axes of its bone.
+# Names of a clip's curves with the offset of the gaze target from its rest place, in Blender units
+# and in the axes of the target's bone.
 TARGET = ("eyes.x", "eyes.y", "eyes.z")
 TURNS = {"head": HEAD, "neck": NECK, **{f"eye_{side}": names for side, names in EYES.items()}}
 BONES = (*(name for names in TURNS.values() for name in names), *TARGET)  # curves that move bones

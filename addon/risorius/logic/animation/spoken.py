@@ -253,7 +253,7 @@ def label_of(sound: Sound, mouth: str) -> str:
 
     Args:
         sound: the sound of the marker.
-        mouth: name of its mouth shape, such as M B P.
+        mouth: name of the sound's mouth shape, such as "M B P" for the sounds M, B and P.
     """
     return f"{sound.word}: {mouth}" if sound.word else mouth
 

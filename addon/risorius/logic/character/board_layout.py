@@ -217,7 +217,7 @@ class _Block:
 
 
 def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
-    """Whether the handle of a GUI control moves sideways.
+    """Whether the handle of a GUI control moves left and right on the board.
 
     Args:
         table: the GUI controls.
@@ -349,8 +349,8 @@ def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool =
     Args:
         handles: handles that are not placed yet.
         titles: region -> title, in the order of the blocks.
-        is_own: True: the table was made from raw controls, so all handles are placed in rows by
-            region.
+        is_own: True: the face's GUI controls were made from names of raw controls, so all handles
+            are placed in rows by region.
     """
     left = list(handles)
     blocks = []
@@ -490,7 +490,7 @@ def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
 
 
 def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
-    """Make a cell for each stem of handles; tall cells are last.
+    """Make a cell for each stem of handles. The cells are sorted by height, the lowest first.
 
     Short handles on a side of the face whose stems differ only in a final U or D, for the upper and
     the lower lip, share a cell.

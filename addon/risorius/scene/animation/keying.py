@@ -442,7 +442,10 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of the last key in time, if a curve has at most two."""
+    """Set interpolation and handle types of a curve's last key, if it has at most two keys.
+
+    Blender copies both settings to later keys from the key before.
+    """
     if len(curve.keyframe_points) > 2:
         return  # Blender copied both settings from the previous key
     for key in (

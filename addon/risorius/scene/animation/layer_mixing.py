@@ -377,7 +377,8 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
     """The times in seconds, "start" and "end", between which a layer plays a constant pose.
 
-    Without "end" the pose plays for ever; an empty result means at all times.
+    If the result has no "end", the pose plays from "start" for ever. If the result is empty, the
+    pose plays at all times.
     """
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
