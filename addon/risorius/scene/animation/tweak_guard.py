@@ -330,7 +330,11 @@ def _take_all(
     Then reset controls that were keyed at other frames: they get the values that they have at the
     current frame without the tweak.
 
-    hands: the moved controls, one _Hand for each frame, from `_hands_of`.
+    Args:
+        controls: the control armature.
+        tweak: the active tweak.
+        hands: the moved controls, one _Hand for each frame, from `_hands_of`.
+        frame: current frame of the scene.
     """
     with tweaks.curves_so_far(controls) as old:
         for hand in hands:

@@ -255,7 +255,8 @@ class _Reader:
 
         Args:
             depsgraph: dependency graph at this frame; it is evaluated again with the posed rig.
-            raw, own: results of inputs.read_mixed.
+            raw: float32[R], the raw controls with layers, before the eye bones add to them.
+            own: rotations and gaze target of the control bones, with layers.
         """
         if not joint_readings.of(self.rig, self.live).places:
             yield

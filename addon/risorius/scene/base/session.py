@@ -19,6 +19,7 @@ from collections.abc import (
 from functools import lru_cache
 from typing import Generic, Literal, Protocol, TypeVar, cast, get_args
 
+# The events at which registered tables and values are reset.
 # free: before undo, redo and load, which invalidate pointers to Blender's data. undo: after undo
 # and redo. load: after a file was loaded. frame: before a frame is evaluated. rewrite: all values
 # must be written again. unregister: empties all tables except those with quit. Tables with quit

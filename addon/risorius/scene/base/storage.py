@@ -132,9 +132,17 @@ def content(text: object) -> bytes:
 
 
 def _limit(text: bpy.types.Text, packed: bytes) -> int:
-    """The largest number of bytes to unpack: the stored length, or the limit if none is stored.
+    """The largest number of bytes to unpack: the length of the DNA file that the Text stores.
 
-    Raises ContentError if the stored length is invalid or exceeds the limit.
+    If the Text stores no length, the result is the largest allowed length: _MOST_TIMES times the
+    packed size plus 64 KB.
+
+    Args:
+        text: a Text with a DNA file.
+        packed: the packed bytes of the file.
+
+    Raises:
+        ContentError: the stored length is invalid, or larger than the largest allowed length.
     """
     said = text.get(_LENGTH)
     if said is None:

@@ -151,12 +151,12 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 
 
 def _sideways(live: runtime.Runtime) -> dict[int, float]:
-    """GUI control -> joint motion along +x, divided by the length of the motion; -1 to 1.
+    """Index of a GUI control -> joint motion along +x, divided by the motion's length; -1 to 1.
 
     The motion from rest to the control's highest value is summed over all joints; +x is the left
-    side of the face. Only controls that move
-    the middle of the face sideways are included. Their names do not define the direction, because
-    "left" in jawLeft may mean the viewer's left.
+    side of the face. Only controls that move the middle of the face sideways are included. The
+    names of these controls do not define the direction, because "left" in jawLeft may mean the
+    viewer's left.
     """
     table = live.table
     chosen = [
