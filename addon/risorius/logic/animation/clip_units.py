@@ -241,7 +241,14 @@ def quaternions(angles: Float) -> Float:
 
 
 def angles_of(turns: Float) -> Float:
-    """The inverse of `quaternions`. Returns: float64[n, 3], yaw, pitch and roll in radians."""
+    """The inverse of `quaternions`: the angles of rotations of a head, a neck or an eye.
+
+    Args:
+        turns: float64[n, 4], unit quaternions, w first.
+
+    Returns:
+        float64[n, 3], yaw, pitch and roll in radians.
+    """
     w, x, y, z = np.moveaxis(np.asarray(turns, np.float64), -1, 0)
     pitch = -np.arcsin(np.clip(2 * (w * x + y * z), -1.0, 1.0))
     yaw = np.arctan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z))

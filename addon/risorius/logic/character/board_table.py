@@ -118,7 +118,8 @@ class BoardTable:
     def breaks_of(self, gui: int) -> list[float]:
         """Values of a GUI control at which the range of one of its rows begins or ends, and 0.
 
-        Args: gui  index of the control.
+        Args:
+            gui: index of the control.
         """
         ends = {0.0, float(self.lowest[gui]), float(self.highest[gui])}
         for _raw, rows in self._pieces[gui]:

@@ -40,7 +40,11 @@ def places(controls: bpy.types.Object) -> bpy.types.bpy_prop_collection_idprop[R
 
 
 def of(controls: bpy.types.Object) -> list[RISORIUS_PG_layer]:
-    """The layers that are not removed, bottom to top. Args: controls  the control armature."""
+    """The layers that are not removed, bottom to top.
+
+    Args:
+        controls: the control armature.
+    """
     return [layer for _place, layer in ordered(controls)]
 
 

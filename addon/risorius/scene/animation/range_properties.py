@@ -83,7 +83,11 @@ def changes() -> int:
 
 
 def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
-    """The ranges of a face, one for each control. Args: controls  its control armature."""
+    """The ranges of a face, one for each control.
+
+    Args:
+        controls: the character's control armature.
+    """
     return list(getattr(controls, ROWS))
 
 
@@ -142,7 +146,11 @@ def keep(controls: ArmatureObject, ranges: "native.Ranges") -> None:
 
 
 def forget(controls: ArmatureObject) -> None:
-    """Remove the ranges of a face. Args: controls  its control armature."""
+    """Remove the ranges of a face.
+
+    Args:
+        controls: the character's control armature.
+    """
     rows: Any = getattr(controls, ROWS)
     rows.clear()
     setattr(controls, SOURCE, "")

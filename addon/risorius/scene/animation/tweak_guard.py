@@ -88,7 +88,8 @@ _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load
 def trouble(controls: ArmatureObject) -> str:
     """The reason why the tweak could not store the last key or moved control; "" if it could.
 
-    Args: controls  a control armature.
+    Args:
+        controls: a control armature.
     """
     return _troubles.get(controls.session_uid, "")
 

@@ -355,7 +355,11 @@ def is_mixed(controls: ArmatureObject) -> bool:
 
 
 def now(controls: ArmatureObject) -> Stand:
-    """The current pose of the controls. Args: controls  the original or evaluated armature."""
+    """The current pose of the controls.
+
+    Args:
+        controls: the original or evaluated armature.
+    """
     face, rig = controls.pose.bones[parts.FACE], parts.rig_of(controls.original)
     found = Stand({n: float(v) for n, v in face.items() if isinstance(v, float)})
     if rig is not None:

@@ -34,7 +34,7 @@ _refused: set[int] = session.keep("last_written.refused", set, ("rewrite", "undo
 
 
 def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
-    """Store the state of a datablock. Returns: whether it differs from the stored state.
+    """Store the state of a datablock, and return whether it differs from the state stored before.
 
     Args:
         kept: table of states: `inputs`, `places` or `weights`.

@@ -167,7 +167,11 @@ def title_of(rig: ArmatureObject) -> str:
 
 
 def maximum_of(controls: ArmatureObject) -> float:
-    """The hard maximum of a character's sliders. Args: controls  its control armature."""
+    """The hard maximum of a character's sliders.
+
+    Args:
+        controls: the character's control armature.
+    """
     return 1.5 if controls.get(OVERDRIVE) else 1.0
 
 

@@ -167,7 +167,11 @@ def at(*ends: End) -> Callable[[Function], Function]:
 
 
 def end(word: End) -> None:
-    """Reset all values that are registered for an event. Args: word  the event."""
+    """Reset all values that are registered for an event.
+
+    Args:
+        word: the event.
+    """
     for entry in _by_end.get(word, ()):
         entry.clear()
 
@@ -178,7 +182,11 @@ def held() -> list[str]:
 
 
 def ends_of(name: str) -> tuple[str, ...]:
-    """The events that reset a value. Args: name  of the value."""
+    """The events that reset a value.
+
+    Args:
+        name: name of the value.
+    """
     return tuple(_entries[name].ends)
 
 

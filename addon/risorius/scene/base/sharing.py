@@ -191,7 +191,7 @@ def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.I
 
 
 def _takes(owner: bpy.types.bpy_struct, name: str, choice: str) -> bool:
-    """Set an enum property. Returns: whether the property accepts this choice."""
+    """Set an enum property, and return whether the property accepts the given choice."""
     try:
         setattr(owner, name, choice)
     except TypeError:

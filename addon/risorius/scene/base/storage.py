@@ -111,7 +111,11 @@ def content_hash(text: object) -> str:
 
 
 def text_of(rig: ArmatureObject) -> bpy.types.Text | None:
-    """The Text with the DNA file of a character, or None. Args: rig  its deforming armature."""
+    """The Text with the DNA file of a character, or None.
+
+    Args:
+        rig: the character's deforming armature.
+    """
     text = rig.get(parts.DNA)
     return text if isinstance(text, bpy.types.Text) else None
 

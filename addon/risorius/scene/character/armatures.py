@@ -352,7 +352,11 @@ def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
 
 
 def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
-    """The extent of a face, to place outlines of bones. Args: plan  its meshes and joints."""
+    """The extent of a face, to place outlines of bones.
+
+    Args:
+        plan: the plan of the face, for its meshes and joints.
+    """
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     between = control_places(plan)["eyes"][0]
     middle, wide = _sides(points, between[2], plan.size)

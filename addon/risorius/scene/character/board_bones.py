@@ -183,7 +183,11 @@ def _sideways(live: runtime.Runtime) -> dict[int, float]:
 
 
 def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.float64]:
-    """float64[J, 3]: joint positions in Blender units. Args: deltas  float32[J, 9] of a Pose."""
+    """float64[J, 3]: joint positions in Blender units.
+
+    Args:
+        deltas: float32[J, 9] of a Pose.
+    """
     dna, space = live.dna, live.space
     angles = np.asarray(dna.neutral_joint_rotations, np.float64)
     if live.rig.rotation == "euler":

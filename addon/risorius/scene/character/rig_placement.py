@@ -53,7 +53,11 @@ def _follows(rig: ArmatureObject) -> bool:
 
 
 def _is_at(rig: ArmatureObject, wanted: NDArray[np.float64]) -> bool:
-    """Whether a rig's object matrix equals a matrix up to rounding. Args: wanted  the matrix."""
+    """Whether a rig's object matrix equals a matrix up to rounding.
+
+    Args:
+        wanted: the matrix.
+    """
     there = np.array(rig.matrix_basis).ravel()
     return bool(np.abs(there - wanted.ravel()).max() <= _NEAR * np.abs(wanted).max())
 

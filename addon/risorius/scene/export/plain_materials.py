@@ -527,7 +527,10 @@ def _pack(image: bpy.types.Image) -> None:
 def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) -> bpy.types.Image:
     """Pack a baked image, or a copy of a reused image, under a new file name.
 
-    The file name is appended to `files`. Returns: the packed image.
+    The file name is appended to `files`.
+
+    Returns:
+        The packed image.
     """
     taken = name not in flat.baked
     if taken:

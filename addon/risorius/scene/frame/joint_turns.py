@@ -23,7 +23,11 @@ _NOTHING = 1e-7  # components of a quaternion up to this size count as 0
 
 
 def has_any(rig: ArmatureObject) -> bool:
-    """Whether a character has raw controls of joint rotations. Args: rig  deforming armature."""
+    """Whether a character has raw controls of joint rotations.
+
+    Args:
+        rig: deforming armature.
+    """
     live = runtime.of(rig)
     return live is not None and bool(live.turning)
 

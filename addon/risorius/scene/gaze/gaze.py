@@ -105,7 +105,7 @@ def moved(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
 
 
 def _middle(seen: ArmatureObject) -> Vector:
-    """The midpoint between the two eye bones at rest."""
+    """The midpoint between the two eye bones at rest, in the armature's space."""
     bones = seen.pose.bones
     heads = [bones[n].bone.head_local for n in ("eye_L", "eye_R") if n in bones]
     return sum(heads, Vector()) / max(len(heads), 1)

@@ -67,7 +67,14 @@ class _Tree:
         return node.outputs[1]
 
     def taken(self, mesh: object, value: object, index: object, kind: str) -> Socket:
-        """Samples a value at vertex `index` of the mesh; `kind` is the data type of the value."""
+        """Sample a value at one vertex of a mesh.
+
+        Args:
+            mesh: the mesh.
+            value: the field to sample.
+            index: index of the vertex.
+            kind: data type of the value, such as "FLOAT_VECTOR".
+        """
         node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT")
         self.put(mesh, node.inputs[0])
         self.put(value, next(s for s in node.inputs if s.name == "Value" and s.enabled))
@@ -75,7 +82,7 @@ class _Tree:
         return next(s for s in node.outputs if s.enabled)
 
     def between(self, a: object, b: object, share: object) -> Socket:
-        """Mixes two vectors; a share below 0 or above 1 extrapolates."""
+        """Mix two vectors: share 0 gives `a`, 1 gives `b`, a share outside 0 to 1 extrapolates."""
         node = self.node("ShaderNodeMix", data_type="VECTOR", clamp_factor=False)
         where = {s.identifier: s for s in node.inputs}
         for value, name in ((share, "Factor_Float"), (a, "A_Vector"), (b, "B_Vector")):
@@ -164,7 +171,8 @@ def _lines(g: _Tree, count: int, rows: int) -> Node:
 def _aside(g: _Tree, lock: Socket, most: float) -> Node:
     """A random displacement of each lock, up to `most` Blender units along each axis.
 
-    Returns: a node that scales the displacement; the caller connects its input Scale.
+    Returns:
+        A node that scales the displacement; the caller connects the input Scale of the node.
     """
     parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
     parted.inputs["Min"].default_value = [-most] * 3
@@ -285,7 +293,7 @@ def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
 
 
 def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: float) -> Node:
-    """Wind strands about their path. Returns: the last node.
+    """Wind strands about their path.
 
     The strands of a lock start at nearly the same angle, so that they stay together.
 
@@ -296,6 +304,9 @@ def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: 
         kind: kind of strands.
         coil: radius and pitch of the winding.
         unit: metres per Blender unit.
+
+    Returns:
+        The last of the added nodes, whose output has the wound curves.
     """
     radius, pitch = coil.radius / unit, coil.pitch / unit
     finer = g.node("GeometryNodeResampleCurve", {"Curve": curves, "Count": points})

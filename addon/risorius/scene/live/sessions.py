@@ -171,7 +171,8 @@ def _reserve(key: tuple[str, int, str]) -> None:
 def neutral_now(session: Session) -> bool:
     """Use the newest received face as neutral face, which is subtracted from all later faces.
 
-    Returns: whether a face was received.
+    Returns:
+        Whether the session has received a face.
     """
     frame = session.receiver.latest(session.subject)
     if frame is None:

@@ -92,7 +92,8 @@ def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
 def model_of(item: MeshObject) -> Model:
     """Read the data for the pictures of a head, and store the paths for `paths_of`.
 
-    Args: item  mesh with shape keys.
+    Args:
+        item: mesh with shape keys.
     """
     keys, mesh = parts.keys_there(item), item.data
     turn = np.array(item.matrix_world.to_3x3(), np.float64)

@@ -159,7 +159,11 @@ def _packed(sounds: Sequence[Sound]) -> str:
 
 
 def _built(action: bpy.types.Action) -> list[Sound]:
-    """The sounds from which the keys were made. Raises SpokenError if they are lost."""
+    """The sounds from which the current keys of the mouth were made.
+
+    Raises:
+        SpokenError: the sounds are lost.
+    """
     try:
         found = [Sound(float(begin), str(name)) for begin, name in json.loads(of(action).built)]
     except (ValueError, TypeError):
@@ -223,8 +227,14 @@ def trouble(action: bpy.types.Action) -> str:
 
 
 def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
-    """Check that the voice of an action can be corrected. Returns: data path -> curve. Raises
-    SpokenError with the reason if it cannot."""
+    """Check that the voice of an action can be corrected.
+
+    Returns:
+        Data path -> F-curve, for all F-curves of the action.
+
+    Raises:
+        SpokenError: the voice cannot be corrected; the text gives the reason.
+    """
     said = of(action)
     begins = [row.begin for row in said.sounds]
     if not begins:
@@ -393,12 +403,13 @@ def _turn(
     left: Floats | None = None,
     right: Floats | None = None,
 ) -> None:
-    """Set the handle of a key that points into the replaced span; its other handle is unchanged.
+    """Set the handle of a key that points into the replaced span; the key's other handle stays.
 
     Args:
         key: the key.
         bent: True: Bezier interpolation; False: linear.
-        left, right: new position of the handle, frame and value; None: unchanged.
+        left, right: new end of the left or right handle, as frame and value; None: this handle
+            stays.
     """
     kept = key.handle_left[:], key.handle_right[:]
     if bent:

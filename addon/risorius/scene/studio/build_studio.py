@@ -117,7 +117,9 @@ def _eyes(rig: ArmatureObject) -> np.ndarray:
 def _guess(corners: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, float]:
     """Guess the midpoint between the eyes, and the distance between the eyes.
 
-    Args: corners  float64[n, 3], corners of bounding boxes, axes  float64[3, 3], axes of the head.
+    Args:
+        corners: float64[n, 3], corners of the bounding boxes of the face's meshes.
+        axes: float64[3, 3], the columns are the axes of the head in the space of the corners.
     """
     inside = corners @ axes
     low, high = inside.min(axis=0), inside.max(axis=0)
