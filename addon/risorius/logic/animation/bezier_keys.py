@@ -100,7 +100,8 @@ class Fitter:
             Bezier; each key has the value of its sample. If all samples are within the tolerance
             of the first sample, the curve has one key.
         """
-        # A left and a right control often have equal samples.
+        # Results are cached by their samples, because a left and a right control often have equal
+        # samples.
         known = frames.tobytes(), values.tobytes()
         if known not in self._done:
             self._done[known] = self._fit(frames, values)

@@ -158,8 +158,8 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
 
     Args:
         sounds: the list.
-        begin: frame at which the sound begins; moved if the sound or the one before it would last
-            less than SHORTEST.
+        begin: frame at which the sound begins; moved if the sound or the sound before it would
+            last less than SHORTEST, a quarter of a frame.
         name: phoneme of the sound.
         end: frame at which the list ends.
 

@@ -22,7 +22,8 @@ SWITCH = "risorius_use_range"
 SOURCE = "risorius_range_source"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 _LEAST, _MOST = 0.1, 1.9  # limits of extreme minus neutral, equal to the limits in risorius.ranges
-# Number of changes of the capture ranges of all faces, which caches compare.
+# Number of changes of the capture ranges of all faces since the add-on was enabled. A cache
+# compares this number with its stored number to notice changes.
 _changes = session.value("range_properties.changes", 0, ("unregister",))
 
 

@@ -113,25 +113,28 @@ class Stroke:
 
     @property
     def start(self) -> Float:
-        """float64[3]: position of the point at the press, in world space."""
+        """float64[3]: position of the dragged point at the mouse press, in world space."""
         return self._of().world[0]
 
     @property
     def dragged_region(self) -> str:
-        """The region of the control that moves the point most, of those that the drag may move."""
+        """The region of the control that moves the dragged point most.
+
+        Only controls that the drag may move are compared.
+        """
         strongest = int(np.argmax(np.linalg.norm(self.reach, axis=0) * self.state.free))
         return native.regions().of_slider(self.live.labels[strongest])
 
     def to(self, context: Context, target: Float, view: Float | None = None) -> Float:
-        """Drag the point to a target and show the face.
+        """Move the dragged point to a target as near as possible, and show the face.
 
         Args:
             context: its view layer is evaluated.
-            target: float64[3], wanted position in world space.
+            target: float64[3], wanted position of the point in world space.
             view: float64[3], a direction along which the position is free; None: no free direction.
 
         Returns:
-            float64[3]: the reached position in world space.
+            float64[3]: the reached position of the point in world space.
 
         Raises:
             FaceError: the face is a library override that Blender does not allow to change; the

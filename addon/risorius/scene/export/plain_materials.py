@@ -158,7 +158,10 @@ def _read(flat: _Flat) -> None:
 
 
 def _lay_out(flat: _Flat) -> None:
-    """Choose the UV layer for baking a material; meshes get a new layer if needed."""
+    """Choose the UV coordinates for baking a material.
+
+    The meshes get a UV map for baking if their own UV map is missing or cannot be used.
+    """
     if not flat.baked:
         return
     users = [(item, *_corners(item, slot)) for item, slot in flat.users]

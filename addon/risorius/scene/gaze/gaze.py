@@ -40,8 +40,8 @@ class Target:
     Attributes:
         rest: rest position of the target, at which the eyes look ahead.
         moved: vector from the rest position to the target.
-        meet: convergence, 0: the eyes rotate only as far as the direction to the target changes
-            by `moved`; 1: both eyes look at the target itself.
+        meet: convergence, 0 to 1. 0: each eye rotates by the angle by which the direction to the
+            target has changed since rest; 1: both eyes look at the target itself.
     """
 
     rest: Vector

@@ -22,7 +22,7 @@ from .recordings import Recording
 
 # Session uid of a control armature -> Session.
 _sessions: dict[int, Session] = registry.table("sessions.sessions", ("unregister",))
-# (source, port, host) -> the Receiver that the sessions with this address share
+# (kind of source, port, host) -> the Receiver that all sessions with these three settings share.
 _receivers: dict[tuple[str, int, str], native.Receiver] = registry.table(
     "sessions.receivers", ("unregister",)
 )

@@ -176,7 +176,11 @@ def _poses(pose: native.Pose) -> causes.Poses:
 
 
 def _state(now: present.Present, kind: str) -> object:
-    """The values on which the colours of a heat map depend."""
+    """The values on which the colours of a heat map depend, compared to notice changes.
+
+    These are the LOD and, for all kinds of heat maps except CONTROL, the raw controls, solo and
+    mute.
+    """
     return (now.lod, None) if kind == "CONTROL" else (now.lod, now.raw.tobytes(), now.look)
 
 
