@@ -36,7 +36,8 @@ class Timing:
         rate: frames per second of the scene, fps / fps_base.
         start: frame of the scene at the clip's time `origin`.
         origin: time in seconds on the clip's clock.
-        whole: True: keys are placed on whole frames only, see onto_frames.
+        whole: True: keys are placed on whole frames of the scene only. A sample between two whole
+            frames gives a key on each of them.
     """
 
     rate: float
@@ -148,7 +149,7 @@ def keys_of(
         curves: float32[names, frames].
         times: float64[frames], seconds, ascending.
         timing: conversion from the clip's time to frames of the scene.
-        sliders: curve name -> property name, see property_names.
+        sliders: name of a clip's curve -> property name of the slider that the curve drives.
         with_eyes: True: curves of eye rotation become keys too.
 
     Returns:

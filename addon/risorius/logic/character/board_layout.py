@@ -285,7 +285,7 @@ def handles_of(
 
     Args:
         table: the GUI controls.
-        ways: direction of each GUI control, from ways_of.
+        ways: direction on the board in which each GUI control's handle moves when its value grows.
         region_of: stem of a handle -> region.
         taken: bone names that are in use.
 

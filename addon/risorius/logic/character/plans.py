@@ -218,7 +218,7 @@ def plan_character(
         fallback_name: used if the file has no name.
         lods: levels of detail to build.
         unit_scale: metres per Blender unit.
-        rests: values of raw controls at rest, see plan_controls.
+        rests: rest value of each raw control; missing values are 0.
 
     Returns:
         The plan; it keeps no reference to `dna`.

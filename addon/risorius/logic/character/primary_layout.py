@@ -34,8 +34,8 @@ def lay_out(table: BoardTable, handles: Sequence[Handle]) -> Board:
     """Draw the board around its handles.
 
     Args:
-        table: from primary_table.table_of.
-        handles: from primary_table.handles_of.
+        table: the GUI controls of the primary board.
+        handles: the handles of the primary board, with their places.
 
     Returns:
         Board with its centre at 0, 0.

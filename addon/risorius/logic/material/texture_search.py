@@ -262,7 +262,7 @@ def find(
     """Find textures: first the files that the DNA file names, then files with known names.
 
     Args:
-        wanted: (mesh base, role) -> file name, from from_metadata.
+        wanted: (mesh base, role) -> file name that the metadata of the DNA file gives.
         meshes: base name and kind of each mesh.
         folders: folders to search; a match in an earlier folder wins.
 

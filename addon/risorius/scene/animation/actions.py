@@ -20,8 +20,8 @@ from ..base import compat, saved
 from ..base.blender_types import Animated
 
 BEFORE = "risorius_before"  # on a datablock with a baked action: its animation before the bake
-# Custom property that marks a baked action. `restore` removes such an action if nothing else uses
-# it and the user did not edit its keys (see `was_edited`).
+# Custom property that marks a baked action. `restore` removes a marked action if no other datablock
+# uses it and the user did not edit its keys.
 BAKED_ACTION = "risorius_baked_action"
 _DIGEST = "risorius_digest"  # on a baked action: result of `_digest` after the bake
 _LINEAR = 1  # number of Blender's interpolation "LINEAR"

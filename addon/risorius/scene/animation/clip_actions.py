@@ -108,7 +108,7 @@ def make_action(
     Args:
         rig: the character's deforming armature.
         clip: risorius.Clip; curves such as "head.yaw" rotate the bones of head, neck and eyes.
-        timing: frames of the scene at which the clip plays, from timing_of.
+        timing: conversion from the clip's time to frames of the scene.
         name: name of the action.
         with_eyes: animate the eye bones too if the clip has eye rotations.
         tolerance: largest difference of a slider from the clip after the fit of Bezier keys; a

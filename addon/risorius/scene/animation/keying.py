@@ -240,7 +240,7 @@ def key(
         context: has the settings and the frame.
         rig: the character.
         labels: names of the sliders to key.
-        bones: data paths of control bones to key, as in Pose.
+        bones: data paths of the rotations and locations of control bones to key.
 
     Returns:
         The number of keyed properties.

@@ -365,7 +365,7 @@ def fire(
 
     Args:
         controls: control armature of the character.
-        name: name of the reaction, see known_reactions.
+        name: name of the reaction, a key of the dict known_reactions().
         frame: frame of the scene; need not be whole.
         strength: 0 to 1, factor on the reaction's values.
 

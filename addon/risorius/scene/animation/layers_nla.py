@@ -100,7 +100,12 @@ def _weight_curve(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> bpy.typ
 
 
 def _push_down(controls: ArmatureObject, rig: ArmatureObject) -> None:
-    """Convert the active action to a strip, like Blender's Push Down Action."""
+    """Convert the active action of a face to a strip, like Blender's operator Push Down Action.
+
+    Args:
+        controls: the control armature of the face.
+        rig: the deforming armature of the face.
+    """
     data = controls.animation_data
     if data is None or data.action is None:
         return

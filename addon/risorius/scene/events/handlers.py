@@ -369,7 +369,7 @@ def refresh(moment: evaluate.Moment = evaluate.Moment.UPDATE) -> None:
     """Evaluate all characters now, in every scene and view layer.
 
     Args:
-        moment: the moment of this update, see evaluate.Moment.
+        moment: the reason for this evaluation, such as an edit, a frame or a loaded file.
     """
     if native.problem() or not parts.rigs():
         return

@@ -150,7 +150,7 @@ def held_by(expression: native.Expression, weights: Iterable[str]) -> set[str]:
 
     Args:
         expression: the expression.
-        weights: names of the expression's sliders on this face, from weights_for.
+        weights: names of the sliders of this face to which the expression gives a value.
     """
     if expression.regions:
         return set(expression.regions)

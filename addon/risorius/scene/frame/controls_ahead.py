@@ -5,7 +5,7 @@ Blender evaluates a frame with its simulations, and calls handlers afterwards. V
 write are too late for cloth and hair. So Risorius evaluates the control armatures first in a
 separate graph, and the face has its pose when the frame begins.
 
-The scene of that graph belongs to no file, see `stage`.
+The separate graph has a temporary scene that belongs to no file (base/stage.py).
 """
 
 from __future__ import annotations
