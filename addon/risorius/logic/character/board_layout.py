@@ -369,7 +369,12 @@ def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool =
 
 
 def _label(stem: str, region: str) -> list[str]:
-    """The label of a handle, in short lines."""
+    """The label of a handle in upper case, split into short lines.
+
+    Args:
+        stem: name of the handle's bone without prefix and side.
+        region: region of the face to which the handle belongs.
+    """
     words = _LABELS.get(stem.lower()) or slider_words.title_in_region(stem, region, sided=False)
     text = words.upper()
     rows: list[str] = []
@@ -475,7 +480,12 @@ def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block
 
 
 def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
-    """Distribute cells evenly over as few rows as fit into a width."""
+    """Distribute cells over the smallest number of rows, so that the rows have similar widths.
+
+    Args:
+        cells: the cells of a block, in their order.
+        width: largest width of a row, in board units.
+    """
     total = sum(cell.width + _GAP for cell in cells)
     share = total / max(1.0, np.ceil(total / width))
     rows: list[list[_Cell]] = [[]]
@@ -513,7 +523,12 @@ def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
 
 
 def _shelves(blocks: Sequence[_Block], width: float) -> list[list[_Block]]:
-    """Arrange blocks in rows up to a given width."""
+    """Arrange blocks in rows; each row gets as many of the next blocks as fit into it.
+
+    Args:
+        blocks: the blocks, in their order.
+        width: largest width of a row, in board units.
+    """
     rows: list[list[_Block]] = []
     for block in blocks:
         taken = sum(b.width + 2 * _MARGIN for b in rows[-1]) if rows else width
@@ -525,7 +540,12 @@ def _shelves(blocks: Sequence[_Block], width: float) -> list[list[_Block]]:
 
 
 def _drawn(rows: Sequence[Sequence[_Block]], width: float) -> Board:
-    """Make a centred board of rows of blocks: places of handles, and all lines."""
+    """Make the board from its rows of blocks: compute the places of handles, and draw all lines.
+
+    Args:
+        rows: rows of blocks, from the top down.
+        width: width of the board between its margins, in board units.
+    """
     handles: list[Handle] = []
     lines: list[Line] = []
     down = -_MARGIN
@@ -552,7 +572,14 @@ def _drawn(rows: Sequence[Sequence[_Block]], width: float) -> Board:
 
 
 def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Line]) -> None:
-    """Add the handles and lines of a cell whose upper left corner is at x, y."""
+    """Add the handles and lines of a cell to the board.
+
+    Args:
+        cell: the cell.
+        x, y: upper left corner of the cell on the board.
+        handles: receives the handles of the cell, with their places.
+        lines: receives the frames and the label of the cell.
+    """
     for handle, across, down in cell.inside:
         place = (x + across, y + down)
         handles.append(replace(handle, place=place))

@@ -361,7 +361,13 @@ def restore(owner: Animated) -> None:
 def _play_again(
     data: bpy.types.AnimData, state: Mapping[str, object], action: bpy.types.Action | None
 ) -> None:
-    """Restore the stored action, slot and blending settings of animation data."""
+    """Restore the stored action, slot and blending settings of animation data.
+
+    Args:
+        data: the animation data of the datablock.
+        state: the settings that `keep` stored.
+        action: the action that was active then, or None.
+    """
     data.action = action
     if action is not None and "slot" in state:
         slot = next((s for s in action.slots if s.identifier == state["slot"]), None)

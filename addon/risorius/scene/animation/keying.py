@@ -326,7 +326,21 @@ def _at_selected(
     move: Callable[[], Collection[str] | None],
     at: Callable[[float], object] | None,
 ) -> int:
-    """Do the work of `by_hand` with at_selected: move and key at each frame with a selected key."""
+    """Move controls at every frame with a selected key of the face, and key the changed controls.
+
+    Args:
+        context: has the settings and the current frame.
+        controls: control armature of the face.
+        move: a function that moves sliders and bones from the pose of the frame; it returns None if
+            it did nothing.
+        at: a function that is called with the frame before each move; None: no function.
+
+    Returns:
+        The number of keyed properties.
+
+    Raises:
+        FaceError: no key is selected, or a tweak is active.
+    """
     if tweaks.of(controls) is not None:
         raise FaceError(told("A tweak is on: end it first, or work at the current frame."))
     frames = selected_frames(controls)
@@ -432,7 +446,12 @@ def _driven(controls: ArmatureObject) -> set[str]:
 
 
 def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FCurve]:
-    """The F-curves of a property that was just keyed. F-curves of sliders get a region colour."""
+    """The F-curves of a property that was just keyed; curves of sliders get their region's colour.
+
+    Args:
+        bag: contains the F-curves of the action.
+        path: data path of the property.
+    """
     curves = [c for c in (bag.fcurves.find(path, index=i) for i in range(4)) if c is not None]
     label = curve_colours.label_of(path)
     if label:

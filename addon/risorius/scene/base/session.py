@@ -210,7 +210,7 @@ def _name(function: object) -> str:
 
 
 def _refill(kept: object, fresh: object) -> None:
-    """Replace the content of an object by the content of a new object."""
+    """Replace the content of the object `kept` by the content of the object `fresh`."""
     if isinstance(kept, MutableMapping):
         kept.clear()
         kept.update(cast("MutableMapping[object, object]", fresh))
@@ -227,7 +227,10 @@ def _refill(kept: object, fresh: object) -> None:
 
 
 def _is_like(kept: object, fresh: object) -> bool:
-    """Whether an object equals a new object; of lists only the length is compared."""
+    """Whether the object `kept` equals `fresh`, a new object in its initial state.
+
+    Only the lengths of lists are compared, not their contents.
+    """
     if isinstance(kept, Sized) and isinstance(fresh, Sized) and len(kept) != len(fresh):
         return False
     if isinstance(kept, (MutableMapping, MutableSet)):

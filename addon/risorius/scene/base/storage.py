@@ -62,7 +62,12 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
 
 
 def _holding(wanted: bytes, digest: str) -> bpy.types.Text | None:
-    """A Text of this .blend whose DNA file has these bytes, or None."""
+    """A Text of this .blend that stores a DNA file with the given bytes, or None.
+
+    Args:
+        wanted: bytes of the DNA file.
+        digest: SHA-256 hash of these bytes.
+    """
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
             return text
@@ -167,7 +172,16 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
 
 
 def _unpack(packed: bytes, limit: int) -> bytes:
-    """Unpack in pieces up to a limit, because a malicious file may unpack to any size."""
+    """Unpack the bytes of a DNA file in pieces, because a malicious file may unpack to any size.
+
+    Args:
+        packed: the packed bytes.
+        limit: largest number of unpacked bytes.
+
+    Raises:
+        ContentError: the bytes are damaged, do not begin like a DNA file, or unpack to more bytes
+            than `limit`.
+    """
     unpacking = zlib.decompressobj()
     pieces, count, rest = [], 0, packed
     while not unpacking.eof:

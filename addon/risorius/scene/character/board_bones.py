@@ -328,7 +328,7 @@ def _disc(controls: ArmatureObject, layout: Board, name: str) -> bpy.types.Objec
 
 
 def _limit(bone: bpy.types.PoseBone, handle: Handle) -> None:
-    """Set size, colour, locks and range of a handle."""
+    """Set the size, the colour, the locks and the range of the bone of a handle."""
     wide = 0.3 if handle.x is not None and handle.y is not None else 0.2
     bone.custom_shape_scale_xyz = (wide, wide, wide)
     bone_shapes.colour(bone, _SIDE_COLOURS[handle.side])

@@ -199,7 +199,11 @@ def _pixels(
     """float32[h, w, 4]: an image, scaled down to at most _TEXELS in width and height.
 
     If the image has no transparent pixels, its alpha becomes the mean of red, green and blue.
-    None if its file is missing.
+    None if the file of the image is missing.
+
+    Args:
+        image: the image.
+        known: cache, full name of an image -> its pixels; this image is added.
     """
     if image.name_full not in known:
         copy = image.copy()

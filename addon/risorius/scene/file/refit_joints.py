@@ -324,9 +324,11 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Reset the pose of joints that the evaluator moved with the old file.
+    """Reset the pose of joints that the evaluator moves with the old file but not with the new one.
 
-    Joints that the evaluator moves with the new file too are left out.
+    Args:
+        change: the replacement.
+        moved: new index of each old joint; -1 if the new file lacks it.
     """
     owned = change.after.owned
     for joint in change.before.owned:

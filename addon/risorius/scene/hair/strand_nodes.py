@@ -62,7 +62,13 @@ class _Tree:
         return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
 
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
-        """A random value from low to high for each value of `number`."""
+        """A field of random values from low to high; equal values of `number` give equal values.
+
+        Args:
+            low, high: range of the values.
+            seed: another seed gives other values.
+            number: field of integers.
+        """
         node = self.node("FunctionNodeRandomValue", {2: low, 3: high, "ID": number, "Seed": seed})
         return node.outputs[1]
 

@@ -160,8 +160,13 @@ def _distance(seen: ArmatureObject, camera: bpy.types.Object) -> float:
 def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
     """Hide the meshes of other levels; meshes that the user hid stay hidden.
 
-    `flag` is the name of the property that hides a mesh in the viewport or in renders. If its value
-    differs from the last written value, the user has set it.
+    If the value of the flag on a mesh differs from the value that the add-on wrote last, the user
+    has set it.
+
+    Args:
+        rig: the deforming armature.
+        level: the level of detail to show.
+        flag: property that hides a mesh: "hide_viewport" or "hide_render".
     """
     for item in parts.meshes_of(rig):
         written, users = f"{parts.HIDDEN_PREFIX}{flag}", f"{parts.HIDDEN_PREFIX}user_{flag}"

@@ -293,13 +293,25 @@ class _Mouth:
         return min(max(at, 0.0), self.said.samples - 1.0)
 
     def window(self, begin: float, end: float) -> tuple[int, int]:
-        """The samples that a change between two frames can affect: (first, last + 1)."""
+        """The samples whose values can change if sounds between two frames of the action change.
+
+        Returns:
+            The number of the first sample, and the number of the last sample plus 1.
+        """
         far = _REACH * self.said.fps
         first, last = int(self.sample(begin - far)), int(np.ceil(self.sample(end + far)))
         return first, last + 1
 
     def curves(self, sounds: Sequence[Sound], first: int, last: int) -> dict[str, Floats]:
-        """Control -> float64[last - first], its values at the samples from first to last - 1."""
+        """The values of the mouth's controls at a range of samples.
+
+        Args:
+            sounds: all sounds of the voice.
+            first, last: the range: sample `first` to sample `last` - 1.
+
+        Returns:
+            Name of a control -> float64[last - first], its values.
+        """
         said = self.said
         times = np.arange(first, last) / said.rate
         ends = [*(sound.begin for sound in sounds[1:]), said.end]
