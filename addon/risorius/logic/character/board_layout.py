@@ -198,7 +198,13 @@ _LIP = re.compile(r"[UD]$")
 
 @dataclass
 class _Cell:
-    """Handles above a common label, each with the offset from the cell's upper left corner."""
+    """Handles of a board above a common label.
+
+    Attributes:
+        width, height: size in board units.
+        label: the lines of the label.
+        inside: (handle, x, y): each handle with its offset from the cell's upper left corner.
+    """
 
     width: float
     height: float

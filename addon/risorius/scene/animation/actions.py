@@ -52,8 +52,14 @@ class Track:
 
 @dataclass
 class Counts:
-    """Totals over the written F-curves: number of keyframes, number of keyframes before the
-    key reduction, largest error of the key reduction, and number of F-curves."""
+    """Totals over all written F-curves.
+
+    Attributes:
+        keys: number of keyframes after the key reduction.
+        all_keys: number of keyframes before the key reduction.
+        error: largest error of the key reduction, in the units of the values.
+        curves: number of F-curves.
+    """
 
     keys: int = 0
     all_keys: int = 0

@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 
 class Row(Protocol):
-    """The members of RISORIUS_PG_sound that this module uses."""
+    """A sound in the list of a voice: the members of RISORIUS_PG_sound that this module uses."""
 
     begin: float
     name: str
@@ -44,7 +44,7 @@ class Row(Protocol):
 
 
 class Rows(Protocol):
-    """The methods of a Blender collection of sounds that this module uses."""
+    """The list of a voice's sounds: the methods of Blender's collection that this module uses."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, place: int) -> Row: ...
@@ -54,7 +54,7 @@ class Rows(Protocol):
 
 
 class Spoken(Protocol):
-    """The members of RISORIUS_PG_spoken."""
+    """The stored data of a voice: the members of RISORIUS_PG_spoken."""
 
     sounds: Rows
     active: int  # index of the chosen sound

@@ -49,8 +49,13 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Moved:
-    """A part with its state before a step, and its world matrix before (`stood`) and after it
-    (`stands`)."""
+    """A part of a face that a step of Blender has changed, or a child of a part.
+
+    Attributes:
+        item: the object.
+        before: state of the object before the step.
+        stood, stands: world matrix of the object before and after the step.
+    """
 
     item: bpy.types.Object
     before: _Seen
