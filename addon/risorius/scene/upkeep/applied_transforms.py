@@ -49,12 +49,13 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Moved:
-    """A part of a face that a step of Blender has changed, or a child of a part.
+    """A part of a face with its positions before and after a step of Blender.
 
     Attributes:
-        item: the object.
-        before: state of the object before the step.
-        stood, stands: world matrix of the object before and after the step.
+        item: the part.
+        before: state of the part before the step.
+        stood, stands: matrix of the part before and after the step, in world space, or relative to
+            a parent that does not belong to the face.
     """
 
     item: bpy.types.Object
