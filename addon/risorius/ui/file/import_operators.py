@@ -39,8 +39,9 @@ def import_character(
     options: build.BuildOptions,
     show: bool = False,
 ) -> Result:
-    """Build a character from a DNA file beside the scene's other faces, and report the result with
-    at most five warnings, or the error.
+    """Build a character from a DNA file and place it beside the other faces of the scene.
+
+    The operator reports the result with at most five warnings, or the error.
 
     Args:
         operator: operator that reports.
@@ -50,7 +51,7 @@ def import_character(
         show: True: frame the face in the 3D views of the user's window.
 
     Returns:
-        The return value for `execute`.
+        {"FINISHED"}, or {"CANCELLED"} after an error: the result of the operator's `execute`.
     """
     try:
         with shown_progress(context) as progress:

@@ -20,7 +20,10 @@ def _preferences(context: Context) -> Any:  # noqa: ANN401  importing the class 
 
 
 def favourites_of(context: Context) -> list[str]:
-    """The favourites of the active face, or the user's if the face has no list of its own."""
+    """The names of the active face's favourite sliders.
+
+    If the face has no list of its own, the list of the add-on's preferences is used.
+    """
     users = getattr(_preferences(context), "favourites", "")
     return favourites.of(face_controls(context), users)
 

@@ -28,8 +28,8 @@ TARGETS = (
 def proposed(context: Context) -> str:
     """The name of the most likely target of the eyes; "" if there is none.
 
-    It is the active or another selected object that is no part of a face; empties are preferred. If
-    there is no such object, it is the scene's camera.
+    The proposal is the active object or another selected object, unless it is a part of a face;
+    empties come first. Without such an object, the proposal is the scene's camera.
 
     Args:
         context: context with the selection and the scene.

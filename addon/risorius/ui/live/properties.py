@@ -98,7 +98,7 @@ def choices(context: Context) -> RISORIUS_PG_live:
 
 
 def settings_of(context: Context) -> sessions.Settings:
-    """The user's settings as an object for a capture; an empty mapping becomes "arkit"."""
+    """The user's settings as an object for a capture; without a mapping file it gets "arkit"."""
     chosen = choices(context)
     return sessions.Settings(
         chosen.source,

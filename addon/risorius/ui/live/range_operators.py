@@ -20,7 +20,7 @@ from ..words import of_error, say
 
 
 class _Learns(FaceOperator):
-    """Base of operators that learn a range."""
+    """Base of operators that learn the capture range of a person and store it with a face."""
 
     baked_too = True
 
@@ -36,7 +36,7 @@ class _Learns(FaceOperator):
     )
 
     def keep(self, context: Context, clip: "native.Clip", performance: bool) -> None:
-        """Learn a range from a captured clip and store it with the active face.
+        """Learn a capture range from a captured clip and store the range with the active face.
 
         Args:
             context: context with the face.

@@ -16,7 +16,7 @@ from ..blender_types import Context
 
 
 def _labels(_self: bpy.types.PropertyGroup, given: bpy.types.Context, typed: str) -> Iterator[str]:
-    """The sliders of the active face that match the typed words."""
+    """The names of the active face's sliders that match the words typed in the search field."""
     rig = parts.active_rig(cast(Context, given))
     live = runtime.of(rig) if rig is not None else None
     labels = live.labels if live is not None else ()

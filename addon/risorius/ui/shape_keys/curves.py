@@ -31,13 +31,13 @@ _MOST = 40  # largest number of drawn lines
 
 
 class _OfCurves(FaceOperator):
-    """Base of operators on unknown curves."""
+    """Base of operators on the curves of the last import whose names no mapping contains."""
 
     baked_too = True
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the face has unknown curves; if not, set the poll message."""
+        """Whether the face has unknown curves of its last import; if not, set the poll message."""
         if not super().poll(context):
             return False
         if unknown_curves.of(face_controls(context)) is None:

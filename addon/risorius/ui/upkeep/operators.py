@@ -33,7 +33,7 @@ SHAPES = (
 def override_trouble(rig: ArmatureObject | None) -> str:
     """The reason why a face with a library override does not move.
 
-    "" if the face moves, has no override, or is None.
+    The result is "" if the face moves or has no library override, or if `rig` is None.
     """
     if rig is None or not rig.override_library:
         return ""
