@@ -26,9 +26,9 @@ constexpr std::size_t kMost = 65535;  // rows or columns
 // write the same row, the later one wins.
 struct GroupKey {
   std::uint32_t below;  // highest layer - layer, so that higher layers come first
-  // levels: the number of LODs of each unit of the group if units with another number of LODs must
-  // not be in it, because they would change the order of its columns; else 0. region is 0 for a
-  // bundle, which may have joints of several regions.
+  // levels: 0, or the number of LODs that use each unit of the group. It is not 0 if units that
+  // other numbers of LODs use would change the order of the group's columns, and are therefore in
+  // other groups. region: 0 for a bundle, which may have joints of several regions.
   std::uint32_t region, chain, bundle, order, levels;
   auto operator<=>(const GroupKey&) const = default;
 };
@@ -122,8 +122,9 @@ class Columns {
 };
 
 // All quaternion joints of a group share the order of its columns, in which columns with more LODs
-// come first. If that changes the order for one of them, the units are divided into groups of equal
-// numbers of LODs, in which no column is moved.
+// come first. If this order differs from the order that one of the joints needs, the units are
+// divided into groups whose units are all used by the same number of LODs. In such a group the
+// number of LODs moves no column.
 Members separated(const Members& groups) {
   Members out;
   for (const auto& [key, list] : groups) {

@@ -128,8 +128,8 @@ std::vector<bool> lods_of(const dna::Dna& dna, const Row& row) {
 }
 
 // Puts units whose rows skip a LOD into chains. Usually each row is used from LOD 0 up to some LOD.
-// A unit whose rows skip a LOD can share a group only with units whose rows skip the same LODs, the
-// units of its chain.
+// A unit with a row that skips a LOD can share a group only with units whose rows are used at the
+// same LODs. These units are one chain.
 void find_chains(const dna::Dna& dna, std::vector<Unit>& units) {
   std::map<std::vector<std::vector<bool>>, std::vector<Unit*>> chains;
   for (Unit& unit : units) {
@@ -156,8 +156,8 @@ std::uint32_t key_of(const Unit& unit) {
   return unit.is_quaternion && rotates(output) ? unit.joint * 9u + 3u : output;
 }
 
-// The row that decides whether a unit is written at a LOD. If one of a joint's rotation attributes
-// has two rows, only the later row counts; among the attributes, the first row does.
+// The row that decides whether a unit is written at a LOD: the first row of the unit that no later
+// row of the unit overwrites, because both write the same rotation attribute.
 const Row& deciding_row(const Unit& unit) {
   const Row* first = nullptr;
   for (std::size_t i = 0; i < unit.rows.size(); ++i) {

@@ -408,9 +408,9 @@ def _raised(noise: Doubles) -> Doubles:
 
 
 def _noise(dice: _Dice, times: Doubles, step: float, loop: bool) -> Doubles:
-    """Slow noise in [-1, 1]: four fifths of a random cubic B-spline with a point every `step`
-    seconds, plus one fifth of a spline with a point every 0.36 * `step` seconds. Periodic only if
-    `loop` is True."""
+    """Slow noise in [-1, 1], float64[times]: 0.8 times a cubic B-spline with a random control point
+    every `step` seconds, plus 0.2 times such a spline with a control point every 0.36 * `step`
+    seconds. The noise is periodic only if `loop` is True."""
     return 0.8 * _spline(dice, times, step, loop) + 0.2 * _spline(dice, times, 0.36 * step, loop)
 
 

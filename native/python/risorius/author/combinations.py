@@ -126,12 +126,14 @@ class Combinations:
     """The correctives of a face, sorted by the number of their controls."""
 
     def __init__(self, work: Work, options: RigOptions, fewer: Fewer[Work] | None = None) -> None:
-        """Prepare the solution.
+        """Sort the correctives of a face.
 
         Args:
-            work: the face; its meshes are made.
+            work: the face of shapes and the face of joints. The meshes of the face of joints must
+                already have their skin weights and blend shapes.
             options: options of the rig.
-            fewer: simplified meshes for the solution, or None.
+            fewer: simplified meshes on which the joint values are solved; None: the whole meshes
+                are used.
         """
         self.work, self.options, self.fewer = work, options, fewer
         self.columns = sk.column_count(work.source)

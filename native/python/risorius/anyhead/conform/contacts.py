@@ -36,8 +36,9 @@ _SEEN = 0.001  # smoothing radii: shorter deltas are not added to a blend shape
 # _MOST: largest fraction of a joint motion that is added to it or removed from it. _FEW: a control
 # with fewer contacts is not corrected.
 _MOST, _FEW = 0.8, 8
-# In smoothing radii: largest delta of one step, and the standard deviation of the Gaussian by which
-# deltas fade out with the distance from the closest contact.
+# _LARGEST: largest displacement that one step adds to a blend shape, in smoothing radii. _FADES:
+# standard deviation, in smoothing radii, of the Gaussian by which these displacements fade out with
+# the distance from the closest contact.
 _LARGEST, _FADES = 0.15, 0.5
 _OVERLAP = 1.5  # standard deviations of the gaps: overlap of the lids that the joints aim at
 _LIDS = 1.7  # radii of an eye: skin within this distance of the eye's centre is a lid
@@ -190,10 +191,11 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
 
 
 def _nearer(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V, 3]: motion that each vertex needs in addition; None if there is no gap.
+    """float64[V, 3]: displacement to add to each vertex so that the lids meet; None if there is no
+    gap.
 
     The gap is divided between both lids in proportion to their motion by the control. The
-    correction fades out behind the rims.
+    displacements fade out with the distance from the closest contact.
     """
     posed = face.at(control)
     ways = posed - face.rest
@@ -235,7 +237,14 @@ def _around(points: Doubles, places: Doubles, reach: float) -> tuple[Doubles, Do
 
 
 def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna | None:
-    """The face with scaled joint motions of a control; None if the control moves no joint."""
+    """The face with scaled joint motions of a control; None if the control moves no joint.
+
+    Args:
+        face: the face.
+        control: index of the raw control.
+        more: float64[V], fraction by which the motion of each vertex must grow. Each joint grows
+            by the mean fraction of its vertices, weighted by their skin weights.
+    """
     dna = face.dna
     vertex, joint, weight = sk.skin_entries(dna.meshes[face.skin])
     held = np.bincount(joint, weights=weight, minlength=len(dna.joint_names))
@@ -264,7 +273,16 @@ def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna 
 def _shapes_go_on(
     face: _Posed, control: int, ways: Doubles, holds: Mapping[int, Hold], change: Change
 ) -> Dna | None:
-    """The face with deltas added to the blend shapes of a control; None if the control has none."""
+    """The face with displacements added to the blend shapes of a control; None if the control has
+    none.
+
+    Args:
+        face: the face.
+        control: index of the raw control.
+        ways: float64[V, 3], the displacements to add to the posed skin.
+        holds: bindings of the meshes that follow the skin, by mesh index.
+        change: the deformation of the skin.
+    """
     dna = face.dna
     channels = dna.blend_shape_channels
     driven = np.asarray(channels.output_indices)[np.asarray(channels.input_indices) == control]
@@ -304,7 +322,16 @@ def _longer(
     change: Change,
     motions: Doubles,
 ) -> _native.BlendShapeTarget:
-    """The blend shape target with deltas added, so that the posed skin moves by `ways`."""
+    """The blend shape target with displacements added, so that the posed mesh moves by `ways`.
+
+    Args:
+        mesh: the mesh of the target.
+        target: the blend shape target; it is not changed.
+        ways: float64[V, 3], displacements of the vertices of the posed skin.
+        hold: the binding of the mesh to the skin; None: the mesh is the skin.
+        change: the deformation of the skin.
+        motions: float64[J, 3, 3], the result of _motions.
+    """
     if hold is None:
         way = ways
     else:

@@ -23,7 +23,8 @@ from .change import Change, Similar, similar
 _ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
 _MOUTH = re.compile(r"saliva", re.IGNORECASE)
 _INNER = 0.35  # radii of an eye: joints closer to the eye's centre move with the eye
-# Distance of the lid rims from the centre of an eye, and its standard deviation, in radii.
+# In radii of the eye: distance of the lid rims from the eye's centre, and the standard deviation of
+# this distance.
 _RIM, _BAND = 1.1, 0.03
 _STIFF = 0.9  # a vertex moves with the eye if the eye's joints have more of its skin weights
 _PRIOR = 0.01  # weight of the surrounding skin against the distance of the lid rims

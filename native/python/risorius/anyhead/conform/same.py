@@ -18,8 +18,8 @@ from .parts import finest, skin_of
 
 _AS_IT_IS = 2.0  # a head up to twice as large or small has the unit of the face
 _LEANS = np.cos(np.radians(30.0))  # cosine of the largest angle of a head to the axes of its file
-# Triangulations of polygons with more corners are not recognised; polygons with more corners in the
-# other mesh are accepted without a comparison.
+# Largest number of corners of a polygon that is compared. A triangulated polygon with more corners
+# is not recognised; a polygon of the other mesh with more corners is accepted without a comparison.
 _FIVE = 5
 
 
@@ -74,14 +74,15 @@ def into_own_space(
 ) -> tuple[dict[str, Doubles], str]:
     """Convert a sculpt to the axes and the unit of a face.
 
-    A sculpt in the axes and the unit of the face is returned unchanged. Another one is rotated,
-    see turn_back(), and scaled. The second value is a sentence about the conversion, "" for none.
+    A sculpt in the axes and the unit of the face is returned unchanged. Any other sculpt is rotated
+    by the result of turn_back() and scaled. The second value is a sentence about the conversion;
+    it is "" if the sculpt is unchanged.
 
     Args:
         dna: the face.
         moved: float64[V, 3] by mesh name; the skin is required.
-        factor: the scale; None: 1 for a head up to twice as large or small as the face, else the
-            ratio of two units that fits best.
+        factor: the scale; None: 1 if the sizes of the head and the face differ by a factor below
+            2, else the ratio of two units that fits best.
     """
     skin = skin_of(dna)
     before = np.asarray(dna.meshes[skin].positions, np.float64)

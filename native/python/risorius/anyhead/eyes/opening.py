@@ -184,7 +184,12 @@ def _regions(core: Mask) -> Ints:
 
 
 def _beside(values: npt.NDArray[Any], of: Callable[..., Any]) -> npt.NDArray[Any]:
-    """The minimum or maximum (`of`) of each cell and its four neighbours."""
+    """For each cell of a grid, the minimum or the maximum of the cell and its four neighbours.
+
+    Args:
+        values: the grid, two-dimensional.
+        of: np.minimum.reduce or a similar function, which reduces a list of five grids to one.
+    """
     padded = np.pad(values, 1, mode="edge")
     return np.asarray(
         of([padded[1:-1, 1:-1], padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:],

@@ -230,7 +230,8 @@ def _by_place(piece: HeadPart, place: _Place) -> str:
 
 
 def _is_flat(points: Doubles) -> bool:
-    """Whether the smallest extent is below 0.6 of the largest, as of lashes but not of a shell."""
+    """Whether the smallest side of the bounding box is below 0.6 of its largest side. Lashes are
+    flat in this sense; a shell around an eyeball is not."""
     extent = np.sort(np.ptp(points, axis=0))
     return bool(extent[0] < 0.6 * extent[2])
 

@@ -166,7 +166,8 @@ def _heads(parts: Sequence[Surface], hints: Hints, tell: Progress) -> list[tuple
 
 
 def _at_end(tell: Progress) -> Progress:
-    """Progress of work that is rarely necessary: it reports 1.0 always, and can be stopped."""
+    """The progress function of extra work after the usual work. It always reports 1.0 to `tell`,
+    because the extra work is rarely necessary; `tell` can stop the work."""
     return lambda _share: tell(1.0)
 
 

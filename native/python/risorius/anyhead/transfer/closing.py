@@ -17,9 +17,11 @@ from .template import TemplateFace
 BLINKS = ("eyeBlinkL", "eyeBlinkR")
 _MOVES = 0.02  # cm: a vertex that a blink moves less does not belong to a lid
 _MEETS, _APART = 0.1, 0.35  # cm: largest distance in contact, and least distance in the rest pose
-# cm: standard deviation of the fall-off around contacts, of the factor and of the shift
+# cm: standard deviation of the Gaussian by which the factor (_AROUND) and the shift (_BESIDE) fade
+# out with the distance from contacts of the lids.
 _AROUND, _BESIDE = 0.3, 0.15
-# of the largest sum of weights: with a smaller sum, the factor tends to 1 and the shift to 0
+# Fraction of the largest sum of the contacts' weights at a vertex. At vertices with a smaller sum,
+# the factor tends to 1 and the shift to 0.
 _REST = 0.02
 _SHARES = (0.3, 2.0)  # smallest and largest factor
 _ROWS = 256  # number of vertices that are compared at once

@@ -214,7 +214,8 @@ def severity(sums: FaultSums) -> float:
 def find_correctives(
     dna: Dna, options: CorrectiveOptions | None = None, progress: Progress | None = None
 ) -> Found:
-    """Find correctives for the worst pairs and triples of controls, and for options.together.
+    """Find correctives for the worst pairs and triples of controls, and for the combinations in
+    options.together.
 
     Args:
         dna: a face of shapes; it is not changed.
