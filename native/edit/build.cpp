@@ -150,7 +150,8 @@ Members list_members(const std::vector<Unit>& units, const Regions& regions) {
     if (u.order != kAnyOrder) out[key(u, u.order)].push_back(&u);
   }
   out = separated(out);
-  // Units whose columns may have any order join a group with a fixed order, if there is one.
+  // Units whose columns may have any order join a group with a fixed order, if there is such a
+  // group with the same layer, region, chain and bundle.
   Members free;
   for (const Unit& u : units) {
     if (u.order == kAnyOrder) free[key(u, kAnyOrder)].push_back(&u);

@@ -131,9 +131,9 @@ void remove_zero_rows(std::vector<Unit>& units) {
     while (i < units.size() && units[i].joint == units[begin].joint) ++i;
     const auto first = units.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = units.begin() + static_cast<std::ptrdiff_t>(i);
-    // No row is removed if one of the joint's units has an overwritten layer, because a row of
-    // zeros may be the one that overwrites another. At least one row of a joint is kept, so that
-    // the rig knows that the joint may move.
+    // No row is removed if a unit of the joint overwrites another unit at some LOD, because the
+    // overwriting row may be a row of zeros. At least one row of a joint is kept, so that the rig
+    // knows that the joint may move.
     const bool layered = std::any_of(first, last, [](const Unit& u) { return u.layer > 0; });
     const auto goes = [&](const Unit& u) { return u.is_zero() && !u.is_quaternion && !layered; };
     auto kept = std::count_if(first, last, [&](const Unit& u) { return !goes(u); });

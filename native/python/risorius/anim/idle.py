@@ -387,8 +387,15 @@ def _gaze_curves(times: Doubles, saccades: list[Saccade], life: Life) -> dict[st
 
 
 def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[str, Doubles]:
-    """Curves of subtle motion. The curve of each side is three quarters common motion and one
-    quarter motion of its own; the jaw has one curve."""
+    """Curves of subtle motion, control name without prefix -> float64[times]. The curve of each
+    side is three quarters common motion and one quarter motion of its own; the jaw has one curve.
+
+    Args:
+        seed: 0 or more; the same seed gives the same curves.
+        times: float64[frames], seconds.
+        scale: factor of all curves, the attribute `micro` of Life.
+        loop: True: the curves end as they begin.
+    """
     out = {}
     for stream, (name, (amount, step)) in enumerate(MICRO.items()):
         common, left, right = (

@@ -265,8 +265,9 @@ def _made(
 
 
 def _take_chosen(work: Work, other: Work) -> None:
-    """Copy to `work` the parents, pivots, mirrored joints, heirs and the joints of each LOD, which
-    were chosen in `other`, the face with simplified meshes."""
+    """Copy quantities that were chosen in `other`, the face with simplified meshes, to `work`: the
+    parents, pivots and mirrored joints, the joints of each LOD, and heirs (for each joint that a
+    LOD lacks, the joint that takes its vertices)."""
     work.parents, work.new, work.pivots = other.parents, other.new, other.pivots
     work.mirrored, work.heirs = other.mirrored, other.heirs
 
@@ -306,8 +307,9 @@ def _new_joints(
     options: RigOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """Fit joints and dense weights of the meshes of LOD 0. Sets pivots, parents, new, mirrored and
-    heirs in `work`."""
+    """Fit joints and dense weights of the meshes of LOD 0. Sets five attributes of `work`: pivots,
+    parents, new (the new joints of each LOD), mirrored (the joint of the other side), and heirs
+    (for each joint that a LOD lacks, the joint that takes its vertices)."""
     room = room_for_second(work, shaped, wanted, options.fit.joints)
     own = replace(options.fit, joints=options.fit.joints - room)
     jaw = _jaw(work)
@@ -386,7 +388,9 @@ def _part(progress: Progress | None, begin: float, end: float) -> Progress | Non
 def _order_levels(
     work: Work, shaped: Sequence[int], fit: Joints, weights: dict[int, Doubles], o: RigOptions
 ) -> None:
-    """Choose the new joints of each LOD. Sets new, mirrored and heirs in `work`.
+    """Choose the new joints of each LOD. Sets three attributes of `work`: new (the new joints of
+    each LOD), mirrored (the joint of the other side), and heirs (for each joint that a LOD lacks,
+    the joint that takes its vertices).
 
     Args:
         work: the face.

@@ -285,8 +285,9 @@ def carriers(work: Work) -> Ints:
 def carried_shares(work: Work, mesh: Mesh) -> Doubles:
     """float64[V, n]: the fraction of a vertex' weights that each of the n joints of resting() has.
 
-    The fraction is the sum of the weights on the joints whose carriers() is this joint. Rows have
-    the sum 1, or 0 for a vertex without weights.
+    The weight of any other joint counts for the joint of resting() that carriers() gives for it:
+    its nearest ancestor that no expression moves. Rows have the sum 1, or 0 for a vertex without
+    weights.
 
     Args:
         work: the face.

@@ -53,7 +53,8 @@ def bake(
 
     Returns:
         The facts of Measure, such as the largest joint translation, and "evaluation_seconds", the
-        time inside the evaluator; a .csv needs an earlier evaluation, which does not count.
+        time inside the evaluator. For a .csv all frames are evaluated twice; the time of the first
+        evaluation does not count.
 
     Raises:
         ValueError: the character lacks this LOD.

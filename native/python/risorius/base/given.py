@@ -164,7 +164,7 @@ def checked(name: str, check: Callable[..., T], value: object, low: float, high:
         high: largest allowed value.
 
     Raises:
-        ArgumentError: not such a number, or out of range; the error names the argument.
+        ArgumentError: `check` refuses the value; the error names the argument.
     """
     try:
         return check(value, low, high)

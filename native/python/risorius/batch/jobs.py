@@ -47,7 +47,8 @@ class Options:
         frames: first and end (exclusive) of the frames after resampling; None: to the clip's end.
         quaternions: True: rotations of joints are quaternions; False: Euler angles.
         compress: True: the .npz is compressed.
-        mapping: the mapping of curves to controls.
+        mapping: name of the built-in mapping of curves to controls, or path of its TOML file;
+            None: the mapping that fits a clip best.
     """
 
     parts: tuple[str, ...] = DEFAULT_PARTS

@@ -41,7 +41,8 @@ class Kept(Generic[_Value]):
         self._values: OrderedDict[object, _Value] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], _Value]) -> _Value:
-        """The value of a key; a value that the cache lacks is made while other threads wait.
+        """The value of a key. A value that the cache lacks is made; until it is made, all
+        other threads that use this cache wait.
 
         Args:
             key: key of the value; hashable.

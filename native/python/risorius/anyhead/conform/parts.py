@@ -210,9 +210,9 @@ def _in_ball(way: Similar, radius: float, balls: Sequence[Ball]) -> Similar:
 def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
     """The transform that keeps the distance between the eyeball and the lid rims in proportion.
 
-    The rims are a narrow band of a sphere and determine its centre well. Its radius needs the
-    transform of the surrounding skin as a prior. That transform is returned if fewer than 12
-    vertices of the rims are visible.
+    The rims are a narrow band of a sphere, so they determine the centre of the sphere well but not
+    its radius. The transform of the skin around the eye is therefore used as a prior, and is
+    returned unchanged if fewer than 12 vertices of the rims are visible.
     """
     start = change.around(middle, radius)
     away = change.before.points - middle

@@ -153,9 +153,13 @@ def _seen(tree: ClosestPoints, ball: Eyeball, rays: Doubles, turn: Doubles | Non
 
 
 def _between_lids(seen: Mask) -> Mask | None:
-    """The largest region of free rays that does not reach the border of the searched grid; a region
-    at the border lies outside the lids. Erosion first cuts leaks through holes of a scan. None if
-    no region is large enough."""
+    """The largest region of free rays that does not reach the border of the searched grid, because
+    a region at the border lies outside the lids. Before the search the free rays are eroded, which
+    separates the opening from holes of a scan. None if no region is large enough.
+
+    Args:
+        seen: bool[columns, rows], whether a ray hits no lid.
+    """
     core = seen
     for cuts in range(_CUTS):
         core = core & _beside(core, np.minimum.reduce)
@@ -213,11 +217,15 @@ def _turned(frame: Frame, across: Doubles, up: Doubles, blob: Mask) -> Frame:
 def _refined(
     tree: ClosestPoints, ball: Eyeball, frame: Frame, columns: Doubles, bounds: Doubles
 ) -> Opening | None:
-    """The lid edges of each column, bisected to a hundredth of a degree; None if the second search
-    finds no free ray.
+    """The opening with finer columns than a coarse search found. The lid edges of each column are
+    bisected to a hundredth of a degree. None if no ray between the coarse edges is free.
 
-    columns: angles across of the first search. bounds: float64[n, 2], lowest and highest free angle
-    of each column. All in radians.
+    Args:
+        tree: the skin near the eye.
+        ball: the eye.
+        frame: axes at the eye's centre.
+        columns: float64[n], angles across at which the coarse search found the opening, radians.
+        bounds: float64[n, 2], lowest and highest angle of a free ray of each column, radians.
     """
     step = np.radians(_STEP)
     ends = columns[[0, -1]] + [-step / 2, step / 2]

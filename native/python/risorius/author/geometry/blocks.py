@@ -31,7 +31,8 @@ def blocks_of(positions: Doubles) -> list[Ints]:
         return [np.arange(count)]
     low, extent = positions.min(axis=0), max(float(np.ptp(positions, axis=0).max()), 1e-30)
     cell = np.minimum((positions - low) / extent * _CELLS, _CELLS - 1).astype(np.int64)
-    # The bits of the three numbers alternate (a Z-order curve), so that neighbours stay together.
+    # In `key` the bits of a vertex's cell in x, y and z alternate (a Z-order curve). So vertices
+    # that are near each other have keys that are near each other.
     key = np.zeros(count, np.int64)
     for bit in range(_CELLS.bit_length() - 1):
         for axis in range(3):

@@ -91,7 +91,8 @@ def fewer_vertices(
         shaped: indices of the meshes that are fitted.
         wanted: mesh -> its displacements.
         most: wanted number of vertices of all these meshes.
-        attributes: attributes for the simplification by mesh; missing ones are added.
+        attributes: mesh -> result of attributes_of(), which the simplification preserves; meshes
+            without an entry are added.
         levels: (level, mesh) -> int64[n, 3], the layout indices of each triangle of a coarser LOD.
         go_on: called before each mesh; raises an error to stop.
     """

@@ -164,12 +164,12 @@ def joined_displacements(wanted: Mapping[int, Wanted], meshes: Sequence[int]) ->
 
 
 def known_attributes(known: dict[int, Floats], m: int, wanted: Wanted) -> Floats:
-    """The attributes of a mesh for the simplification, computed at the first use.
+    """The result of attributes_of() for a mesh, which the simplification preserves.
 
     Args:
-        known: mesh -> attributes.
-        m: the mesh.
-        wanted: its displacements.
+        known: mesh -> attributes that are already computed; the result is added.
+        m: index of the mesh.
+        wanted: the displacements of the mesh.
     """
     if m not in known:
         some = wanted.at(wanted.evenly())

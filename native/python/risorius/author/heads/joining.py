@@ -382,8 +382,8 @@ class _Joining:
 
 
 def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
-    """Append a mesh. The corners of a mesh without texture coordinates all get the same
-    coordinate.
+    """Append a mesh to the joined mesh. All corners of a mesh without texture coordinates get the
+    texture coordinate (0, 0).
 
     Args:
         whole: the joined mesh; changed.

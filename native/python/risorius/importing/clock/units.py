@@ -147,7 +147,8 @@ def seconds_of(
     Args:
         values: float64[frames], as in the file.
         said: unit in the header.
-        asked: the caller's options; the caller of this function handles `counts_rows`.
+        asked: the options on time from the user. The option `counts_rows` has no effect here; code
+            that calls this function must check it before.
         notes: receives a sentence if a unit other than seconds is inferred, and if dates are
             counted from the first frame.
         name: the file's name in errors.
@@ -196,7 +197,7 @@ def _shown(values: Doubles, name: str, column: str | None) -> str:
         column: column of the times, for errors.
 
     Raises:
-        AnimationFileError: none fits.
+        AnimationFileError: the size and the steps of the times fit no unit.
     """
     smallest = float(values.min(initial=np.inf))
     for unit, least in _DATES:
