@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The table of the format's layers, in the order in which a writer appends them.
+// The table of the format's layers, in the order in which a writer appends the layers that are not
+// in the index of the source file.
 #pragma once
 
 #include <array>

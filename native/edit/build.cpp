@@ -35,8 +35,8 @@ struct GroupKey {
 using Members = std::map<GroupKey, std::vector<const Unit*>>;
 
 // The columns of a new group, and the place of each unit's columns among them. Columns that rotate
-// quaternion joints come first, in the order in which their rotations are multiplied
-// (compile::quaternion_column_order keeps it).
+// quaternion joints come first, in the order in which their rotations are multiplied. The compiler
+// keeps this order (compile::quaternion_column_order).
 class Columns {
  public:
   explicit Columns(const std::vector<const Unit*>& units) {

@@ -80,7 +80,7 @@ std::vector<std::uint32_t> count_joints(const std::vector<const Unit*>& units,
   return counts;
 }
 
-// Removes columns of a unit of one row. In: keep  [columns]
+// Removes columns of a unit of one row. In: keep  [columns] whether each column stays
 void keep_columns(const std::vector<bool>& keep, Unit& u) {
   std::size_t n = 0;
   for (std::size_t c = 0; c < keep.size(); ++c) {

@@ -48,7 +48,7 @@ class Reaction:
 
     @property
     def duration(self) -> float:
-        """Seconds from the firing until all controls are at rest."""
+        """Seconds from the start of the reaction until its effect on all controls has ended."""
         return max((p.delay + p.attack + p.hold + p.release for p in self.parts), default=0.0)
 
     def parts_of(self, index: Index) -> list[_Part]:

@@ -274,7 +274,7 @@ def _take_chosen(work: Work, other: Work) -> None:
 
 def _counting(progress: Progress | None, least: int) -> Callable[[], None]:
     """A function that passes a finished fraction to `progress`, and raises DnaError if `progress`
-    returns False. The fraction grows with each call and approaches _BEGUN.
+    returns False. The fraction grows with each call and approaches _BEGUN (0.1).
 
     Args:
         progress: gets the finished fraction.

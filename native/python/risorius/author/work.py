@@ -175,7 +175,7 @@ def require_sizes(dna: Dna) -> None:
 
     Raises:
         ArgumentError: the face has no mesh, no mesh has vertices at different places, or a
-            coordinate is infinite, NaN, or so large (above FARTHEST) that its square could
+            coordinate is infinite, NaN, or so large (above 1e9) that its square could
             overflow.
     """
     if not dna.meshes:
@@ -300,13 +300,13 @@ def carried_shares(work: Work, mesh: Mesh) -> Doubles:
 
 
 def carried_shift(work: Work) -> float:
-    """CARRIED_MM in the file's unit: the shift of unmoved joints in carried_shifts()."""
+    """The length of the shift in carried_shifts(), CARRIED_MM (20 mm), in the file's unit."""
     return CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
 
 
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
     """float64[n, joints, 3]: shifts of all joints if one of n joints is shifted upwards by
-    CARRIED_MM.
+    CARRIED_MM (20 mm), in the file's unit.
 
     The fits use these shifts as additional expressions, so that vertices keep following the same
     joint of neck and head.

@@ -46,7 +46,7 @@ def bake(
         lod: the LOD, from 0.
         outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to write no file.
             Temporary files of killed processes in these folders are not deleted.
-        parts: pose parts to write, some of PARTS.
+        parts: parts of the pose to write: some of "joints", "shapes", "maps" and "controls".
         compress: True: the .npz is smaller, but writing it takes several times longer.
         threads: number of threads; 0: all cores.
         progress: called with the number of finished frames.

@@ -63,7 +63,7 @@ class Face:
         return ("tx", "ty", "tz", *turn, "sx", "sy", "sz")
 
     def rest(self, part: str) -> Floats:
-        """The rest values of a part of the pose, one of PARTS.
+        """The rest values of a part of the pose: "joints", "shapes", "maps" or "controls".
 
         The part "joints" has float32[joints, columns], the differences from the neutral pose: 0 in
         all columns except qw, which has 1. Any other part has float32[n], one value per name.

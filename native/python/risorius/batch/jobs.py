@@ -42,7 +42,7 @@ class Options:
     """Options that change the content of the outputs.
 
     Attributes:
-        parts: parts of the pose to write, from PARTS.
+        parts: parts of the pose to write: some of "joints", "shapes", "maps" and "controls".
         rate: frames per second to resample to; None: as in the clip.
         frames: first and end (exclusive) of the frames after resampling; None: to the clip's end.
         quaternions: True: rotations of joints are quaternions; False: Euler angles.

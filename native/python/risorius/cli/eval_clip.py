@@ -74,7 +74,8 @@ def parse_frames(text: str) -> tuple[int | None, int | None]:
 
 
 def parse_parts(texts: list[str]) -> tuple[str, ...]:
-    """Check the names of the pose parts that are to be written, and sort them as in PARTS.
+    """Check the names of the pose parts that are to be written, and sort them in the order joints,
+    shapes, maps, controls.
 
     Raises: ValueError: a part is unknown or repeated, or no part is named.
     """

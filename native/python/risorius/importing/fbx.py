@@ -22,7 +22,8 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
-# Ticks per second in keyframe times; files of FBX 8000 and later use TICKS_8000.
+# Keyframe times are stored in ticks. TICKS: ticks per second in files of FBX versions below 8000.
+# TICKS_8000: ticks per second in files of version 8000 and later.
 TICKS = 46186158000
 TICKS_8000 = 141120000
 # GlobalSettings.TimeMode -> frames per second.

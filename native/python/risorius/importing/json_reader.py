@@ -103,7 +103,7 @@ class Reader:
         return None
 
     def frames_a_second(self, value: object, place: str) -> float:
-        """Reads a rate from SLOWEST to FASTEST frames per second.
+        """Reads a rate from 0.01 to 1,000,000 frames per second.
 
         Args:
             value: a value of the JSON.

@@ -26,9 +26,10 @@ _FIVE = 5
 def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
     """float64[V, 3] by mesh name: vertex positions in the head, for each LOD 0 mesh with a match.
 
-    A mesh matches if has_polygons_of() is true. If several meshes match, such as both eyes, the
-    mesh whose name has the longest common beginning is taken, then the first. A mesh of the head is
-    taken only once.
+    A mesh of the head matches if has_polygons_of() is true. If several meshes of the head match,
+    such as both eyes, the mesh is taken whose name has the longest common beginning with the name
+    of the face's mesh; of equally similar names, the first. A mesh of the head is taken only
+    once.
 
     Args:
         dna: the face.

@@ -76,9 +76,10 @@ class Opening:
 
     Attributes:
         frame: axes at the eye's centre; `across` is parallel to the line between the eye corners.
-        across: float64[columns], angles from corner to corner in radians, ascending; at most
-            COLUMNS.
-        low, high: float64[columns], angles of the lower and the upper lid's edge in radians.
+        across: float64[columns], angle across of each column from corner to corner, in radians,
+            ascending; there are at most COLUMNS (48) columns.
+        low, high: float64[columns], angle up of the lower and of the upper lid's edge in each
+            column, in radians.
     """
 
     frame: Frame

@@ -49,7 +49,8 @@ _NEAR = 3.0  # mm: a point that is deeper counts as outside
 
 @dataclass(frozen=True)
 class Meeting:
-    """The gap between the lips in a pose, by column from the right mouth corner to the left one.
+    """The gap between the lips in a pose, for each of COLUMNS (40) columns, from the right to the
+    left corner of the mouth.
 
     Attributes:
         gap: float64[COLUMNS], in the target's unit, negative if the lips intersect; all NaN if no

@@ -129,8 +129,8 @@ def skin_and_solids(
 
     Args:
         dna: the face.
-        solids: parts of the names of meshes that the skin must not intersect. Meshes whose names
-            also contain a word of _NO_SOLIDS, such as eyelashes, are no solids.
+        solids: parts of the names of meshes that the skin must not intersect. A mesh whose name
+            also contains "lash", "cornea" or a similar word (_NO_SOLIDS) is no solid.
         lod: index of the LOD.
 
     Raises:
