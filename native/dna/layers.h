@@ -35,8 +35,8 @@ inline const KnownLayer* find_layer(const LayerId& id, std::uint32_t version) {
   return nullptr;
 }
 
-/// Calls f(id, field name, struct) for each layer that has a struct in Dna, in the order of
-/// kLayers. dsce is last, because its bytes depend on the file's version.
+/// Calls f(id, field name, struct) for each layer that has a struct in Dna, in the order of the
+/// table kLayers.
 template <class D, class F>
 void for_each_layer(D& dna, F f) {
   f("desc", "descriptor", dna.descriptor);

@@ -30,7 +30,8 @@ class Uses {
       }
     }
   }
-  /// Removes one use. False, without removing it, if it is the last use at some LOD.
+  /// Removes one use of a control by a row. Returns false, and removes nothing, if it is the last
+  /// use of the control at some LOD.
   bool take(std::uint16_t control, const Row& row) {
     if (!watched_[control]) return true;
     for (std::uint32_t l = 0; l < lods_; ++l) {

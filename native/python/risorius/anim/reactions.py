@@ -66,7 +66,8 @@ class Reaction:
 class Yield:
     """A rule: active controls `by` weaken each control in `of` by a factor.
 
-    The factor is 1 - amount * m; `measure` says whether m is the maximum, minimum or mean of `by`.
+    The factor is 1 - amount * m, where m is the maximum, minimum or mean (see `measure`) of the
+    values of the controls `by`.
     """
 
     name: str

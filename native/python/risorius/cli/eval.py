@@ -186,7 +186,7 @@ def _moved(value: float) -> bool:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The results as text."""
+    """The result of describe() as text."""
     width = max(
         [len(row["name"]) for rows in facts.values() if isinstance(rows, list)
          for row in rows if isinstance(row, dict)],

@@ -119,7 +119,7 @@ def _target(args: argparse.Namespace) -> tuple[str, Path]:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The results as one line of text."""
+    """The facts about an evaluated clip as one line of text."""
     move = f"{facts['largest_move']:.4g} {facts['translation_unit']}"
     joint = facts["largest_move_joint"]
     where = f" ({joint}, frame {facts['largest_move_frame']})" if joint else ""

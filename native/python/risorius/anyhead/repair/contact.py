@@ -142,7 +142,8 @@ class Contacts:
         return out
 
     def _edges_near_teeth(self) -> Ints:
-        """int64[E, 2]: edges between vertices near teeth and gums, as indices in `_near`."""
+        """int64[E, 2]: edges between vertices near teeth and gums. The numbers are indices into
+        self._near, the list of these vertices."""
         place = np.full(len(self.skin.points), -1)
         place[self._near] = np.arange(len(self._near))
         edges = place[self.skin.edges()]

@@ -3,7 +3,8 @@
 
 Vertices that the jaw moves are rotated by the same angle as on the template, about the hinge of the
 other head's jaw. The remaining motion is transformed by the deformation gradients between both
-heads. Both are softened: the motions of similar heads are more alike than the heads.
+heads. Small size differences between the heads change the motions only in part, because the motions
+of similar heads are more alike than the heads.
 """
 
 from __future__ import annotations

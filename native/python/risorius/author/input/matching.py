@@ -137,7 +137,7 @@ def assign(names: Iterable[str], edited: Mapping[str, sayings.Said]) -> Assignme
 
     Args:
         names: names of the shapes.
-        edited: shape -> the user's meaning, in the form of the module said.
+        edited: shape -> the user's meaning, in the notation that the module `said` describes.
 
     Raises:
         GivenError: a meaning of the user is invalid.

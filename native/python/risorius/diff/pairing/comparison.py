@@ -172,7 +172,8 @@ class Comparison:
         return Space("network", [""] * len(a), [""] * len(b), pairs)
 
     def rows_in_a(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
-        """Common numbers of attributes of A's joints: the joint's number * stride + attribute.
+        """Common numbers of attributes of A's joints: common number of the joint * stride +
+        attribute.
 
         Args:
             outputs: int[n], joint index * stride + attribute, as stored in the joint groups of A.
@@ -182,7 +183,8 @@ class Comparison:
         return self.joints.in_a(joint) * stride + attribute
 
     def rows_in_b(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
-        """Common numbers of attributes of B's joints: the joint's number * stride + attribute.
+        """Common numbers of attributes of B's joints: common number of the joint * stride +
+        attribute.
 
         Args:
             outputs: int[n], joint index * stride + attribute, as stored in the joint groups of B.

@@ -47,7 +47,8 @@ _NAMES: dict[str, str] = {
     **{f"{word}in{unit}": of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{unit: _UNIT_OF[unit] for unit in _ALONE},
     **dict.fromkeys(_FRAME_NUMBERS, FRAMES),
-    # These entries are last, because they replace equal keys: "times" is not "time" with unit "s".
+    # These entries are last, so that they replace equal keys above: the header "times" is a word
+    # without a unit, and not the word "time" with the unit "s".
     **dict.fromkeys([*_WORDS, "t", "ts"], ""),
 }
 # Texts in brackets in the header of frame numbers, as in "frame (no)", that are no unit of time.
