@@ -82,7 +82,8 @@ class Columns {
     }
   }
 
-  // The largest number of LODs at which each column rotates a quaternion joint.
+  // For each column, the number of LODs at which it rotates a quaternion joint; the largest of
+  // these numbers if the column rotates several quaternion joints.
   std::vector<std::uint32_t> levels_of(const std::vector<const Unit*>& units) const {
     std::vector<std::uint32_t> levels(controls_.size(), 0);
     for (const Unit* u : units) {

@@ -67,7 +67,8 @@ class Uses {
   std::vector<std::int64_t> counts_;  // [controls, LODs]
 };
 
-// [controls] how many joints of a region each control moves. In: units  of the region, by joint
+// [controls] how many joints of a region each control moves.
+// In: units  the units of the region, sorted by joint
 std::vector<std::uint32_t> count_joints(const std::vector<const Unit*>& units,
                                         std::size_t controls) {
   std::vector<std::uint32_t> counts(controls, 0), last(controls, UINT32_MAX);

@@ -72,7 +72,8 @@ void take_rotation(const dna::JointGroup& g, std::uint32_t group,
   unit.order = is_ascending(unit.columns) ? kAscending : kOfGroup + group;
 }
 
-// Completes the units of the quaternion joints of a group. In: turned  joint -> number of its unit
+// Adds the columns and values of the rotations of a group to the units of its quaternion joints.
+// In: turned  joint -> number of its unit
 void take_rotations(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>& quaternions,
                     const std::map<std::uint32_t, std::size_t>& turned, std::vector<Unit>& units) {
   if (turned.empty()) return;
@@ -119,7 +120,7 @@ void add_group(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>
   take_rotations(dna, index, quaternions, turned, out);
 }
 
-// [LODs] whether each LOD uses a row, finest first.
+// [LODs] for each LOD whether it uses a row; the finest LOD is first.
 std::vector<bool> lods_of(const dna::Dna& dna, const Row& row) {
   std::vector<bool> out(dna.descriptor.lod_count);
   const auto& lods = dna.behavior.joint_groups[row.group].lods;

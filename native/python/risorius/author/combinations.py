@@ -109,7 +109,8 @@ class _Skin:
         return self._made.bring(shaped, motions)
 
     def rows(self, at: Ints) -> Doubles:
-        """float64[n, joints]: dense weights of some vertices."""
+        """float64[n, joints]: the weights of the vertices `at` on all joints of the face of
+        joints."""
         out = np.zeros((len(at), self._count))
         np.put_along_axis(out, self._made.joints[at], self._made.weights[at], axis=1)
         return out

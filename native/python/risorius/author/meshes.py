@@ -256,7 +256,7 @@ class Made:
         self.errors.append(left)
 
     def finish(self) -> None:
-        """Store the meshes in the Dna."""
+        """Store the finished meshes of all LODs in the face of joints."""
         dna = self.work.dna
         dna.meshes, dna.mesh_names, dna.lod_mesh_mapping = self.meshes, self.names, self.listed
         dna.mesh_blend_shape_channel_mapping = np.array(

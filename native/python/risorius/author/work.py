@@ -210,7 +210,8 @@ def _check_size(dna: Dna, count: int, together: Container[int]) -> None:
     joints, vertices = len(dna.joint_names), [len(mesh.positions) for mesh in dna.meshes]
     numbers = 9 + 3 * 16  # attributes of a joint, and three matrices for its world transform
     budget.hold(8 * numbers * count * joints, f"{joints:,} joints that {count:,} inputs move")
-    # Large meshes are worked on in blocks.
+    # A mesh of more than LARGE vertices is processed in blocks, so the tables have the size of a
+    # block.
     vertices = [min(count, LARGE) for count in vertices]
     budget.hold(8 * joints * max(vertices), f"weights of {joints:,} joints")
     alone = sum(column not in together for column in range(count))

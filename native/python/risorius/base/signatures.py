@@ -76,7 +76,7 @@ _BYTES = (
     (b"RZC\x1a", 0,
      Kind("rzc", "a clip of Risorius (.rzc)", "if its name ends otherwise, rename it")),
 )  # fmt: skip
-# Names inside ZIP archives that identify documents.
+# Names of files inside a ZIP archive that show the kind of the document.
 _INSIDE = (
     (b"xl/workbook", _EXCEL),
     (b"word/document", _WORD),

@@ -49,7 +49,7 @@ class Report:
         return [outcome for outcome in out if outcome and outcome.error]
 
     def facts(self) -> dict[str, Any]:
-        """The result as plain values, for JSON."""
+        """The result of the batch as plain values, which json.dumps accepts."""
         failed = self.failed()
         return {
             "jobs": len(self.plan.jobs),

@@ -105,7 +105,7 @@ class Refiner:
         return out
 
     def _weights(self, of: Sequence[Combination], poses: Doubles) -> Doubles:
-        """float64[poses, combinations]: weights of the combinations."""
+        """float64[poses, combinations]: the weight of each combination at each pose."""
         rows = [weight_of(one.weight, *(poses[:, self._column[n]] for n in one.of)) for one in of]
         return np.array(rows).reshape(len(of), len(poses)).T
 

@@ -143,7 +143,7 @@ def _whole_of(unit: str) -> str:
 
 
 def _rows(group: str) -> Iterator[tuple[str, Mapping[str, float]]]:
-    """Name and control weights of each target of a group."""
+    """For each target of a group, its name, and full name of a control -> weight."""
     if group == "arkit":
         yield from arkit.mapping().items()
         return

@@ -51,11 +51,11 @@ class Similar:
 
     @property
     def size(self) -> float:
-        """The scale factor."""
+        """The factor by which the transform scales lengths."""
         return float(np.cbrt(max(np.linalg.det(self.linear), 0.0)))
 
     def __call__(self, points: Doubles) -> Doubles:
-        """Transform points: float64[n, 3] -> float64[n, 3]."""
+        """float64[n, 3]: points of the source head, transformed to the target head."""
         return self.becomes + (points - self.middle) @ self.linear.T
 
 

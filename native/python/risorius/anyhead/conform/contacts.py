@@ -72,14 +72,19 @@ class _Posed:
         self.rest = np.asarray(self._probe.positions(self.raw()), np.float64)
 
     def raw(self, control: int = -1) -> npt.NDArray[np.float32]:
-        """float32[R]: raw controls of the rest pose, with one at 1 if its index is given."""
+        """float32[R]: the raw controls of the rest pose. The control of index `control` is at 1 if
+        the index is 0 or more."""
         out = np.array(self.rig.initial_raw_controls, np.float32)
         if control >= 0:
             out[control] = 1
         return out
 
     def at(self, control: int) -> Doubles:
-        """float64[V, 3]: vertex positions with one control at 1."""
+        """float64[V, 3]: vertex positions of the skin with one control at 1.
+
+        Args:
+            control: index of the raw control; the others have their values of the rest pose.
+        """
         return np.asarray(self._probe.positions(self.raw(control)), np.float64)
 
 

@@ -115,7 +115,7 @@ def turn_back(turn: Doubles) -> Doubles:
 
 
 def right_angles() -> list[Doubles]:
-    """The 24 rotations by right angles, the identity first."""
+    """float64[3, 3] each: the 24 rotations that map axes to axes, the identity first."""
     out = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):

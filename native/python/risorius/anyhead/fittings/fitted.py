@@ -39,7 +39,7 @@ class Fitted:
     own: bool = True
 
     def surface(self) -> Surface:
-        """The mesh as triangles."""
+        """The mesh `part` with its polygons divided into triangles."""
         return Surface.of_polygons(self.part.mesh.positions, self.part.mesh.faces)
 
 

@@ -237,7 +237,9 @@ def _is_flat(points: Doubles) -> bool:
 
 
 def _joined(pieces: Sequence[HeadPart], kind: str) -> HeadPart:
-    """Islands of a mesh, joined into one mesh."""
+    """Islands of a mesh that have the same kind, joined into one mesh. The result keeps the name of
+    the mesh if there is a single island and the name shows the kind. Otherwise lashes, brows,
+    teeth, tongue and gums are named after their kind."""
     first = pieces[0]
     name = first.name if len(pieces) == 1 and _named(first.name) else _called(first, kind)
     if len(pieces) == 1:

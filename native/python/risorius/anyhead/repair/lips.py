@@ -243,7 +243,8 @@ class Lips:
         return np.arctan2(arm[:, 0], arm[:, 2])
 
     def _column(self, points: Doubles) -> Ints:
-        """int64[n]: the column of each point, -1: none."""
+        """int64[n]: the index of the column in which each point lies; -1 for a point that lies
+        outside all columns."""
         at = np.searchsorted(self._edges, self._around(points)) - 1
         return np.where((at >= 0) & (at < COLUMNS), at, -1)
 

@@ -124,7 +124,8 @@ def _around(
 
 
 def _squares(one: Doubles, other: Doubles) -> Doubles:
-    """float64[n, m]: squares of the distances between points."""
+    """float64[n, m]: the squared distance of each of n points `one` from each of m points
+    `other`."""
     middle = other.mean(axis=0)  # numbers near 0 lose less precision
     a, b = one - middle, other - middle
     square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T

@@ -165,7 +165,7 @@ def _add_targets(
 
 
 class _Nearest:
-    """The nearest points of a skin at rest."""
+    """Finds the points of a skin, in its rest pose, that are nearest to other points."""
 
     def __init__(self, dna: Dna, skin: int) -> None:
         self._dna, self._skin = dna, skin

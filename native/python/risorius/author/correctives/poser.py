@@ -22,7 +22,8 @@ _NO_SOLIDS = ("lash", "shell", "cornea", "edge", "cartilage", "saliva", "hair_",
 
 
 class Poser:
-    """Poses the skin and the solids by raw controls."""
+    """Computes poses of a face's skin, and of the solids that it must not intersect, from raw
+    controls."""
 
     def __init__(self, dna: Dna, skin: int, solids: Sequence[int]) -> None:
         self.dna = dna

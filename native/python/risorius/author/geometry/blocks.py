@@ -134,7 +134,8 @@ class SparseWeights:
         return len(self.joints)
 
     def __getitem__(self, vertices: Ints) -> Doubles:
-        """float64[n, joints]: dense weights of some vertices."""
+        """float64[n, joints]: the weights of the given vertices on all joints, as a dense
+        matrix."""
         out = np.zeros((len(vertices), self.count))
         rows = np.arange(len(vertices))
         for k in range(self.joints.shape[1]):
@@ -142,5 +143,5 @@ class SparseWeights:
         return out
 
     def some(self, vertices: Ints) -> SparseWeights:
-        """The weights of some vertices."""
+        """The weights of the given vertices, still sparse."""
         return SparseWeights(self.joints[vertices], self.weights[vertices], self.count)

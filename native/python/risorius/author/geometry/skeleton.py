@@ -104,7 +104,8 @@ def psd_parts(dna: Dna) -> dict[int, frozenset[int]]:
 
 
 def joint_levels(dna: Dna) -> list[Ints]:
-    """Joint indices by depth in the hierarchy, roots first."""
+    """Joint indices by depth in the hierarchy, one array for each depth: first the roots, then
+    their children, and so on."""
     at = np.asarray(dna.joint_parents, np.int64)
     depth = (at != np.arange(len(at))).astype(np.int64)
     for _ in range(len(at).bit_length()):  # pointer jumping: 1 step up, then 2, then 4

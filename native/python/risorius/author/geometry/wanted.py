@@ -84,7 +84,7 @@ class Wanted:
 
     @property
     def small(self) -> bool:
-        """Whether the mesh is a single block."""
+        """Whether the mesh is a single block because it has at most LARGE (60,000) vertices."""
         return len(self._blocks) == 1
 
     def blocks(self) -> Iterator[Block]:
@@ -113,7 +113,8 @@ class Wanted:
         return out
 
     def evenly(self) -> Ints:
-        """Indices of at most LARGE vertices, evenly taken from all."""
+        """Indices of all vertices. If there are more than LARGE (60,000) vertices, only every
+        second, third or nth vertex is listed, so that at most LARGE indices are returned."""
         return np.arange(0, len(self), -(-len(self) // LARGE) if len(self) else 1)
 
 

@@ -361,7 +361,7 @@ def _back(shift: Doubles) -> Doubles:
 
 
 class _Transforms:
-    """Matrices from the properties of a node."""
+    """Makes transformation matrices from the properties of an FBX node."""
 
     def __init__(self, scene: Scene, node: Node) -> None:
         self._scene, self._node = scene, node
@@ -393,7 +393,13 @@ class _Transforms:
         return np.diag([*self._three(name, 1.0), 1.0])
 
     def turn(self, name: str, order: str = "XYZ") -> Doubles:
-        """The matrix of a rotation about fixed axes, from angles in degrees."""
+        """float64[4, 4]: the matrix of a rotation.
+
+        Args:
+            name: name of the property with the three angles in degrees.
+            order: the axes in the order in which the node is rotated about them. The axes stay
+                fixed: they do not rotate with the node.
+        """
         angles = np.radians(self._three(name, 0.0))
         out = np.eye(4)
         for letter in order:

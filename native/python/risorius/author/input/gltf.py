@@ -185,7 +185,7 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
 
 
 class _Part:
-    """The vertices of a primitive; other primitives may share them."""
+    """The vertices of a glTF primitive. Several primitives of a mesh may share these vertices."""
 
     def __init__(self, document: Document, primitive: Mapping[str, Any], place: str) -> None:
         attributes = primitive.get("attributes")
@@ -334,7 +334,8 @@ def _texture(document: Document, primitive: Mapping[str, Any]) -> Mapping[str, A
 
 
 def _names(row: Mapping[str, Any], count: int) -> list[str]:
-    """Unique names of the morph targets, from extras.targetNames or numbered."""
+    """Unique names of the morph targets: the names in extras.targetNames; "target0" and so on if
+    the mesh has no such list or a list of another length."""
     extras = row.get("extras")
     given = extras.get("targetNames") if isinstance(extras, dict) else None
     rows = given if isinstance(given, list) and len(given) == count else [None] * count

@@ -103,7 +103,7 @@ def _list(place: Place, noun: str, a: npt.ArrayLike, b: npt.ArrayLike) -> None:
 
 
 def _stride(joints: risorius.MlJoints) -> int:
-    """Attributes per joint: 10 with quaternions, otherwise 9."""
+    """The number of attributes of each joint: 10 if rotations are quaternions, otherwise 9."""
     keys, values = joints.parameter_keys.tolist(), joints.parameter_values.tolist()
     return 10 if (1, 1) in zip(keys, values, strict=False) else 9
 

@@ -149,7 +149,7 @@ class Comparison:
 
     @cached_property
     def psds(self) -> Space:
-        """Correctives, matched by their factors."""
+        """The correctives of both rigs, matched by their factors."""
         names_a, names_b = (
             correctives(dna, which, self.raw, self.ml, self.pose_controls)
             for dna, which in ((self.a, "a"), (self.b, "b"))
@@ -162,7 +162,7 @@ class Comparison:
 
     @cached_property
     def networks(self) -> Space:
-        """Networks, matched by the controls that they write."""
+        """The networks of both rigs, matched by the controls that they write."""
         a = self.a.machine_learned_behavior.neural_networks
         b = self.b.machine_learned_behavior.neural_networks
         pairs = pair_sets(
