@@ -93,7 +93,8 @@ class _Skin:
         return sk.skinned(shaped, self.weights[:, self._own], motions[self._own])
 
     def shaped(self, active: Sequence[int]) -> Doubles:
-        """float64[V, 3]: vertices in the face of joints with its blend shapes, before skinning."""
+        """float64[V, 3]: vertices of the face of joints before skinning, with the blend shapes of
+        the inputs `active` at 1."""
         return np.asarray(
             self.positions
             + sum((self.made_shapes[c] for c in active if c in self.made_shapes), 0.0)
@@ -296,7 +297,8 @@ class Combinations:
         return np.asarray(np.linalg.solve(normal, asked).reshape(count, 6))
 
     def values(self) -> Doubles:
-        """float64[new joints, 6, correctives]: joint values of correctives, sorted as `order`."""
+        """float64[new joints, 6, correctives]: the values that each corrective adds to the new
+        joints; the correctives are in the order of self.order."""
         return self.after.deltas[self.order, self.first :, :6].transpose(1, 2, 0)
 
     def finish(

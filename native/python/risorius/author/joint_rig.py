@@ -51,7 +51,8 @@ from .work import (
     resting,
 )
 
-# Finished fraction at the ends of the preparation, of the fit and of the meshes.
+# Finished fraction of the work after the preparation, after the fit of the joints, and after making
+# the meshes.
 _BEGUN, _FIT, _MESHES = 0.1, 0.7, 0.8
 _SOLVED = 0.6  # finished fraction of the work on correctives once joint values are solved
 _EMPTY = 2.0  # groups by region may have this factor more coefficients than groups by drivers
@@ -396,7 +397,7 @@ def _order_levels(
         work: the face.
         shaped: indices of the fitted meshes.
         fit: the joints.
-        weights: mesh -> float64[V, joints].
+        weights: index of a mesh -> float64[V, joints], skin weights of the mesh.
         o: options of the rig, with the number of joints of each LOD.
     """
     used = given(work)
@@ -448,7 +449,7 @@ def _fit(
     Args:
         work: the face.
         meshes: indices of the meshes.
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         jaw: index of the joint that opens the mouth, or None.
         options: options of the fit.
         progress: gets the finished fraction of the fit.

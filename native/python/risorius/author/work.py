@@ -38,8 +38,8 @@ class RigOptions:
     """Options of a joint rig."""
 
     fit: FitOptions = field(default_factory=FitOptions)
-    # Blend shapes correct a vertex if the joints' error exceeds this, in mm. None: the limit is
-    # `tolerance` times the head's height.
+    # Largest error in mm that the joints may leave at a vertex; blend shapes correct larger errors.
+    # None: `tolerance` times the height of the head.
     tolerance_mm: float | None = None
     tolerance: float = TOLERANCE
     shapes: bool = True  # False: joints only, no blend shapes
@@ -200,7 +200,7 @@ def _check_size(dna: Dna, count: int, together: Container[int]) -> None:
 
     Args:
         dna: the face.
-        count: number of its inputs.
+        count: number of inputs of the face.
         together: inputs that are correctives.
 
     Raises:
@@ -337,7 +337,7 @@ def new_weights(work: Work, meshes: Sequence[int], weights: dict[int, Doubles]) 
     Args:
         work: the face.
         meshes: indices of the meshes.
-        weights: mesh -> float64[V, joints].
+        weights: index of a mesh -> float64[V, joints], skin weights of the mesh.
     """
     return np.concatenate([weights[m][:, len(work.source.joint_names) :] for m in meshes])
 

@@ -137,7 +137,8 @@ def keep_contacts(
 
 
 def _touch(face: _Posed, control: int, change: Change, lids: npt.NDArray[np.bool_]) -> Touch | None:
-    """The lid contacts of a control; None if there are too few."""
+    """The contacts of the lids at the value 1 of a control; None if there are fewer than _FEW
+    (8)."""
     posed = face.at(control)
     far = np.linalg.norm(posed - face.rest, axis=1)
     moving = np.flatnonzero(lids & (far > _FAR * change.reach))
@@ -234,8 +235,14 @@ def _moving(ways: Doubles, change: Change) -> Ints:
 
 
 def _around(points: Doubles, places: Doubles, reach: float) -> tuple[Doubles, Doubles]:
-    """float64[n, m]: Gaussian weights of the contacts at each point; float64[n]: the squared
-    distance of the closest contact."""
+    """float64[n, m]: Gaussian weights of the m contacts at each of n points; float64[n]: the
+    squared distance of each point from its closest contact.
+
+    Args:
+        points: float64[n, 3].
+        places: float64[m, 3], positions of the contacts.
+        reach: standard deviation of the Gaussian.
+    """
     apart = ((points[:, None] - places) ** 2).sum(axis=2)
     near = apart.min(axis=1)
     return np.exp(-(apart - near[:, None]) / (2 * reach**2)), near

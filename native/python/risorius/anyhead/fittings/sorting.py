@@ -106,8 +106,8 @@ def eyeball_of(eye: Eye) -> Eyeball:
 
 
 def _pieces(part: HeadPart, eyes: Sequence[Eye]) -> list[HeadPart]:
-    """The islands of a mesh, the island most likely to be the face first; a mesh with a known name
-    stays whole."""
+    """The islands of a mesh as meshes; the island that is most likely the face is the first. A mesh
+    whose name shows its kind, such as "teeth", stays whole."""
     if _named(part.name) is not None:
         return [part]
     labels = islands_of(part.mesh)

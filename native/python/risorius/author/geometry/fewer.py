@@ -64,7 +64,7 @@ class Fewer(Generic[F]):
 
     Attributes:
         work: the face as Work; its meshes have the same indices.
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         meshes: the simplified meshes by index.
         made: the simplified meshes with weights on the new joints; empty before these are known.
     """
@@ -89,7 +89,7 @@ def fewer_vertices(
     Args:
         work: the face.
         shaped: indices of the meshes that are fitted.
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         most: wanted number of vertices of all these meshes.
         attributes: mesh -> result of attributes_of(), which the simplification preserves; meshes
             without an entry are added.

@@ -101,7 +101,7 @@ class Mover:
 
         Args:
             dna: the face with the blend shape channels.
-            mesh: one of its meshes.
+            mesh: a mesh of the face.
         """
         self._positions = np.asarray(mesh.positions, np.float64)
         self._vertex, self._joint, self._weight = skin_entries(mesh)

@@ -57,7 +57,7 @@ class Wanted:
 
         Args:
             work: the face of shapes.
-            mesh: one of its meshes.
+            mesh: a mesh of the face.
             go_on: called before each block; raises an error to stop.
         """
         self.mesh, self._work = mesh, work
@@ -136,7 +136,7 @@ def displacements(work: Face, mesh: Mesh) -> Doubles:
 
     Args:
         work: the face of shapes.
-        mesh: one of its meshes, or a block of one.
+        mesh: a mesh of the face, or a block of such a mesh.
     """
     positions = np.asarray(mesh.positions, np.float64)
     weights = sk.dense_weights(mesh, len(work.source.joint_names))
@@ -157,7 +157,7 @@ def joined_displacements(wanted: Mapping[int, Wanted], meshes: Sequence[int]) ->
     """float64[C, V, 3]: the displacements of all vertices of some meshes, concatenated.
 
     Args:
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         meshes: indices of the meshes.
     """
     every = [wanted[m].at(np.arange(len(wanted[m]))) for m in meshes]

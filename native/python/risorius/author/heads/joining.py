@@ -88,7 +88,7 @@ def join(
         where: name of the file in error messages.
         parts: the meshes in a common space.
         unit: unit of the format and of the result, "cm" or "m".
-        wishes: the user's settings; others are guessed.
+        wishes: the user's settings; a value that the user did not set is guessed.
         edited: the user's meanings of names, see matching.assign().
         axes: names of x, y and z in notes, each with a sign.
         stands: whether the meshes are already upright and in the unit, so that nothing is guessed.

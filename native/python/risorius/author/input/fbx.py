@@ -181,7 +181,7 @@ def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], In
     Args:
         scene: the open file.
         node: the mesh.
-        count: number of its vertices.
+        count: number of vertices of the mesh.
     """
     order = _numbers(scene, node, "PolygonVertexIndex").astype(np.int64)
     last = order < 0
@@ -199,7 +199,7 @@ def _uvs(scene: Scene, node: Node, count: int, corners: Ints) -> tuple[Doubles, 
     Args:
         scene: the open file.
         node: the mesh.
-        count: number of its corners.
+        count: number of polygon corners of the mesh.
         corners: int64[count], vertex of each corner.
     """
     layer = node.first("LayerElementUV")

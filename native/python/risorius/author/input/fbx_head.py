@@ -74,7 +74,7 @@ def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
 
     Args:
         mesh: the mesh.
-        faces: number of its polygons.
+        faces: number of polygons of the mesh.
         materials: number of materials of its node.
     """
     layer = mesh.first("LayerElementMaterial")

@@ -293,7 +293,7 @@ def _uvs(
         primitive: the primitive, with the number of its material.
         packed: reads the attributes.
         given: the attributes of the primitive: name -> accessor.
-        count: number of its vertices.
+        count: number of vertices of the primitive.
     """
     texture = _texture(document, primitive)
     extensions = texture.get("extensions")

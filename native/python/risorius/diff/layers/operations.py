@@ -65,7 +65,7 @@ def _size(sets: list[tuple[risorius.MlOperation, ...]], i: int) -> int:
 
 
 def _numbered(noun: str, count_a: int, count_b: int) -> Space:
-    """Elements that have no name and are identified by their index."""
+    """The elements of A and B of a kind without names; elements with the same index match."""
     pairs = pair(np.arange(count_a), np.arange(count_b))
     return Space(noun, [""] * count_a, [""] * count_b, pair_in_place(pairs, count_a, count_b))
 
