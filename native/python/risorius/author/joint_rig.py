@@ -211,7 +211,7 @@ def _made(
         dna: the face of shapes.
         o: options of the rig.
         progress: gets the finished fraction.
-        like: reference to reuse, or None.
+        like: reference whose joints and weights are reused, or None.
         whole: whether meshes get blend shapes and errors are measured.
 
     Returns: the face with quantities computed from it, the joints, the meshes, names of joints by

@@ -57,7 +57,7 @@ class Made:
             options: options of the rig.
             weights: mesh -> float64[V, joints] of the finest meshes, or of their simplified meshes.
             coarse: triangles of the coarser LODs.
-            like: reference to reuse, or None.
+            like: reference whose joints and weights are reused, or None.
             whole: whether to make blend shapes and measure errors.
             fewer: the simplified meshes to which the joints were fitted, or None.
             go_on: called before each mesh and each block; raises an error to stop.

@@ -314,7 +314,7 @@ def carried_shifts(work: Work, joints: Ints) -> Doubles:
 
     Args:
         work: the face; the parents of new joints must be known.
-        joints: n joints that no expression moves, see resting().
+        joints: indices of n joints that no expression moves; resting() lists all such joints.
     """
     out = np.zeros((len(joints), len(work.source.joint_names) + len(work.parents), 3))
     out[..., 1] = carried_shift(work) * (carriers(work) == np.asarray(joints)[:, None])

@@ -126,7 +126,7 @@ def other_kind(data: bytes, own: Container[str] = ()) -> Kind | None:
     """The kind of a file, unless the reader accepts that kind.
 
     Args:
-        data: bytes as for `kind_of`.
+        data: bytes of the file, or the result of `ends_of`.
         own: codes of the kinds that the reader accepts.
     """
     kind = kind_of(data)

@@ -43,7 +43,7 @@ class Options:
 
     Attributes:
         parts: parts of the pose to write: some of "joints", "shapes", "maps" and "controls".
-        rate: frames per second to resample to; None: as in the clip.
+        rate: frames per second to resample to; None: the rate of the clip.
         frames: first and end (exclusive) of the frames after resampling; None: to the clip's end.
         quaternions: True: rotations of joints are quaternions; False: Euler angles.
         compress: True: the .npz is compressed.

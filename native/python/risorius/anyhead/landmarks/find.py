@@ -53,7 +53,8 @@ class Found:
     Attributes:
         landmarks: the landmarks of the head.
         pose: the head model fitted to the head.
-        error: error of the fit in cm of the model, see form.standing.Standing.
+        error: error of the fit in cm of the model, the attribute `error` of
+            form.standing.Standing; a well fitted head has at most 0.13.
         lips_apart: whether the lips are separate; connected lips cannot open.
     """
 

@@ -63,7 +63,7 @@ class Fewer(Generic[F]):
     """A face for the fit of joints, whose large meshes are simplified.
 
     Attributes:
-        work: the face as Work; its meshes have the same indices.
+        work: the face, in which simplified meshes replace the large meshes at the same indices.
         wanted: index of a mesh -> displacements of the mesh in each expression.
         meshes: the simplified meshes by index.
         made: the simplified meshes with weights on the new joints; empty before these are known.
@@ -186,7 +186,7 @@ def _take_own(wanted: Wanted, kept: Ints, corners: Ints, shares: Doubles) -> Non
     Args:
         wanted: the displacements of the whole mesh.
         kept: int64[n], index in the whole mesh of each vertex of the simplified mesh.
-        corners, shares: as in Simplified; changed.
+        corners, shares: the attributes of the same names of Simplified; changed.
     """
     of_kept = wanted.at(kept)
     owner = _owners(wanted.mesh, kept)

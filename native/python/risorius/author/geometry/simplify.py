@@ -131,7 +131,7 @@ def fewer_triangles(
 
     Args:
         mesh: the mesh; it is not changed.
-        attributes: float32[layouts, n], see attributes_of().
+        attributes: float32[layouts, n], the result of attributes_of(), which is preserved.
         vertices: wanted largest number of vertices; seams and borders may require more.
         begin: int64[n, 3], triangles of a finer level as layout indices, which are simplified
             further; None: all triangles of the mesh.

@@ -125,7 +125,7 @@ def column_deltas(dna: Dna, columns: int) -> Doubles:
 
     Args:
         dna: the face.
-        columns: number of inputs, see column_count().
+        columns: number of inputs, the result of column_count().
     """
     out = np.zeros((columns, len(dna.joint_names) * 9))
     for group in dna.joint_groups:
@@ -254,7 +254,7 @@ def skinned(positions: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
     Args:
         positions: float64[V, 3], vertices before skinning.
         weights: float64[V, joints], skin weights.
-        motions: float64[joints, 3, 4], see column_motions().
+        motions: float64[joints, 3, 4], matrix of each joint from neutral to posed positions.
     """
     blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
     return np.einsum("vij,vj->vi", blended[..., :3], positions) + blended[..., 3]
@@ -278,7 +278,7 @@ class Influences:
 
         Args:
             positions: float64[V, 3], vertices before skinning.
-            motions: float64[joints, 3, 4], see column_motions().
+            motions: float64[joints, 3, 4], matrix of each joint from neutral to posed positions.
         """
         flat = motions.reshape(len(motions), 12)
         blended = sum(
@@ -305,7 +305,7 @@ class Skin:
         """float64[V, 3]: displacements of the vertices by linear blend skinning.
 
         Args:
-            motions: float64[joints, 3, 4], see column_motions().
+            motions: float64[joints, 3, 4], matrix of each joint from neutral to posed positions.
         """
         apart = motions - np.eye(3, 4)
         moving = np.flatnonzero(np.abs(apart).max(axis=(1, 2)) > STILL)
@@ -322,7 +322,7 @@ def before_skin(wanted: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
     Args:
         wanted: float64[V, 3], positions after skinning.
         weights: float64[V, joints], skin weights.
-        motions: float64[joints, 3, 4], see column_motions().
+        motions: float64[joints, 3, 4], matrix of each joint from neutral to posed positions.
     """
     blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
     right = (wanted - blended[..., 3])[..., None]

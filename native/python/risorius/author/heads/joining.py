@@ -36,7 +36,9 @@ class FacePart:
         start, stop: range of its vertices.
         faces: range of its polygons.
         joint: name of the joint that the mesh follows.
-        material, source, polygons: its material and its origin, see HeadPart.
+        material: the material of the mesh, or None.
+        source: name of the object in the file to which the mesh belongs.
+        polygons: indices of the mesh's polygons in this object; None: all.
     """
 
     name: str
@@ -89,7 +91,8 @@ def join(
         parts: the meshes in a common space.
         unit: unit of the format and of the result, "cm" or "m".
         wishes: the user's settings; a value that the user did not set is guessed.
-        edited: the user's meanings of names, see matching.assign().
+        edited: name of a shape -> meaning that the user gave it, in the notation that the module
+            `said` describes.
         axes: names of x, y and z in notes, each with a sign.
         stands: whether the meshes are already upright and in the unit, so that nothing is guessed.
 
