@@ -407,7 +407,7 @@ def _order_levels(
     mirrored = fit.mirrored
     place = np.concatenate([used, own])
     # Shifts of joints that no expression moves, such as the neck, count as further expressions, so
-    # that vertices keep following the same of these joints.
+    # that each vertex keeps following the joint that it follows in the source.
     carried = carried_shifts(work, resting(work))[:, place]
     order, heirs = joint_order(
         joined_positions(work, shaped),

@@ -21,8 +21,9 @@ from .levels import LodOptions
 from .pivots import Pivot
 
 MM = {"cm": 10.0, "m": 1000.0}
-# Shift in mm of an unmoved joint in carried_shifts(). A vertex that follows another neck joint than
-# in the source gets this error, because a rotated head separates such vertices about this far.
+# Shift in mm of a joint in carried_shifts(), one of the joints that no expression moves. A vertex
+# that follows another neck joint than in the source has this error, because a rotation of the head
+# moves the vertex about this far from its right position.
 CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
 # all expressions is about a hundred times as large as the deltas in the file.
@@ -56,9 +57,9 @@ class RigOptions:
     # Whether errors at control values between 0 and 1 are measured, which takes a tenth of the
     # total time.
     between: bool = True
-    # Joints are fitted to meshes of about this number of vertices together: larger meshes are
-    # simplified for the fit. Then weights are transferred to all vertices, and blend shapes are
-    # made for the errors there.
+    # Joints are fitted to meshes that have about this number of vertices together; larger meshes
+    # are simplified for the fit. Then the weights are transferred to all vertices of the whole
+    # meshes, and blend shapes correct the errors that remain.
     fit_vertices: int = LARGE
 
 

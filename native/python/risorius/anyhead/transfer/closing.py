@@ -3,7 +3,8 @@
 
 The deformation gradient of a lid does not contain the height of the eye opening. If two points of
 the template's lids meet in a blink, the same points must meet on the head. So motions near these
-points are multiplied by the factor that closes the gap along the motion. A shift closes the rest.
+points are multiplied by the factor that closes the gap along the motion. A displacement is added to
+close the gap that remains.
 """
 
 from __future__ import annotations

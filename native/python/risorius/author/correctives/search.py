@@ -2,8 +2,9 @@
 """Searches for faults of combined expressions, and makes correctives that repair them.
 
 A fault is a state that none of the expressions has alone: skin inside teeth, eyes or itself, faces
-with more than 2.5 times their area, or folded faces. A repair fades out, near the fault only, parts
-of the pose that contribute little there (native/author/correct.h).
+with more than 2.5 times their area, or folded faces. A repair changes only the skin near a fault:
+there it fades out the parts of the pose that contribute little to the pose near the fault
+(native/author/correct.h).
 """
 
 from __future__ import annotations

@@ -133,7 +133,7 @@ def assign(names: Iterable[str], edited: Mapping[str, sayings.Said]) -> Assignme
     """Assign raw controls to shapes. Each control belongs to one shape only.
 
     The user's meanings come first, then names of a vocabulary, then words (mouthOpen for jawOpen).
-    Within these, shapes with a single control come before sums.
+    Within each of these three groups, shapes with a single control come before sums of controls.
 
     Args:
         names: names of the shapes.
