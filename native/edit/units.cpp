@@ -157,8 +157,9 @@ std::uint32_t key_of(const Unit& unit) {
   return unit.is_quaternion && rotates(output) ? unit.joint * 9u + 3u : output;
 }
 
-// The row that decides whether a unit is written at a LOD: the first row of the unit that no later
-// row of the unit overwrites, because both write the same rotation attribute.
+// The row that decides whether a unit is written at a LOD. A later row of the unit overwrites an
+// earlier row that writes the same rotation attribute. Of the rows that are not overwritten, the
+// first one decides.
 const Row& deciding_row(const Unit& unit) {
   const Row* first = nullptr;
   for (std::size_t i = 0; i < unit.rows.size(); ++i) {

@@ -193,7 +193,7 @@ def _beside(values: npt.NDArray[Any], of: Callable[..., Any]) -> npt.NDArray[Any
 
     Args:
         values: the grid, two-dimensional.
-        of: np.minimum.reduce or a similar function, which reduces a list of five grids to one.
+        of: np.minimum.reduce or np.maximum.reduce, applied to a list of five shifted grids.
     """
     padded = np.pad(values, 1, mode="edge")
     return np.asarray(

@@ -125,8 +125,8 @@ class Carrying:
             # jawOpen alone.
             opening = ways[_OPENS].astype(np.float64)
             return self._turned(opening + way, _OPENS) - self._turned(opening, _OPENS)
-        # The displacements of controls that do not move the jaw, such as a smile, do not count for
-        # how far the skin follows the jaw. The addition of the corrective does.
+        # How far the skin follows the jaw is computed without the displacements of controls that do
+        # not move the jaw, such as a smile, but with the addition of the corrective.
         beside = [(c,) for c in pose if len(pose) > 1 and (c,) not in turns and (c,) in ways]
         if pose not in turns or not beside:
             return self._turned(way, pose)

@@ -91,8 +91,8 @@ def fewer_vertices(
         shaped: indices of the meshes that are fitted.
         wanted: index of a mesh -> displacements of the mesh in each expression.
         most: wanted number of vertices of all these meshes.
-        attributes: mesh -> result of attributes_of(), which the simplification preserves; meshes
-            without an entry are added.
+        attributes: index of a mesh -> result of attributes_of(), which the simplification
+            preserves; meshes without an entry are added.
         levels: (level, mesh) -> int64[n, 3], the layout indices of each triangle of a coarser LOD.
         go_on: called before each mesh; raises an error to stop.
     """

@@ -168,7 +168,7 @@ def known_attributes(known: dict[int, Floats], m: int, wanted: Wanted) -> Floats
     """The result of attributes_of() for a mesh, which the simplification preserves.
 
     Args:
-        known: mesh -> attributes that are already computed; the result is added.
+        known: index of a mesh -> attributes that are already computed; the result is added.
         m: index of the mesh.
         wanted: the displacements of the mesh.
     """
