@@ -113,7 +113,8 @@ def _performance(job: Job) -> Performance:
 
 
 def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
-    """Run a job; OSError, ValueError and MemoryError become an Outcome, other errors are raised.
+    """Run a job. An OSError, ValueError or MemoryError gives an Outcome with the text of the error;
+    other errors are raised.
 
     Args:
         job: job whose paths exist on this machine.

@@ -154,7 +154,7 @@ def shortest(value: np.float32) -> float:
 
 
 def describe(dna: risorius.Dna, rig: risorius.Rig, raw: Floats, lod: int) -> dict[str, Any]:
-    """All results for one pose, as plain values.
+    """All facts about a pose that `risorius eval` prints, as plain values.
 
     Args:
         dna: the face.

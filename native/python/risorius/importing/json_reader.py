@@ -176,7 +176,7 @@ class Reader:
 
 
 def first_key(table: Mapping[str, object], keys: Sequence[str]) -> str | None:
-    """The first of these keys that a table has, or None.
+    """The first key in `keys` that a table has; None if it has none of them.
 
     Args:
         table: table of the JSON.
