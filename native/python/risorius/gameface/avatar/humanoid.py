@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The bones of a humanoid: their names in programs and files, and positions of added ones."""
+"""The bones of a humanoid: their names in programs and files, and the positions of bones that are
+added to a face."""
 
 from __future__ import annotations
 
