@@ -173,9 +173,9 @@ void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
   }
 }
 
-// The face without the layers that this version cannot store, without their controls and without
-// unread controls, or nullopt if nothing has to be left out.
-// In: kept  true: layers that the version does not know are written nevertheless
+// The face without the layers that this version cannot store, and without everything that reads
+// the controls of these layers or of layers that were not loaded. nullopt: nothing has to be left
+// out. In: kept  true: layers that the version does not know are written nevertheless
 Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
                                    std::vector<Warning>& warnings) {
   const std::vector<std::string> lost =
