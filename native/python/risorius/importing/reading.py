@@ -307,7 +307,7 @@ def _read_kind(file: Path, data: bytes, options: Options) -> Take:
 
 
 def _read_mouth(text: str, name: str, options: Options) -> Take | None:
-    """Reads mouth shapes, or returns None if the text has another layout."""
+    """Reads a text of mouth shapes from a lip sync tool, or returns None for any other text."""
     if options.kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
         return visemes.read_dat(text.lstrip(), name, options.asked.rate)
     is_asked = options.kind in (None, "rhubarb", "papagayo")

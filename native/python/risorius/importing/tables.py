@@ -87,7 +87,7 @@ class Table:
 
     @cached_property
     def has_points(self) -> bool:
-        """Whether numbers have decimal points.
+        """Whether any cell is a number with a decimal point.
 
         If so, a comma in a cell of a comma-separated table is not a decimal comma.
         """

@@ -128,7 +128,9 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first.
+    """Makes cues from start times; each cue lasts until the next one starts.
+
+    If the first cue starts after 0 s, a cue of the shape `rest` lasts from 0 s until then.
 
     Args:
         starts: (start in seconds, shape) of each cue, ascending.

@@ -79,8 +79,8 @@ def mix_textures(
     taken: set[str] = set()
     for key, name in parents[most].metadata.items():
         mesh = key.split(":")[1] if key.startswith(_KEY) and key.count(":") >= 2 else ""
-        # Skips a name that is the same file as an earlier name on some file systems, and names that
-        # lead to other folders.
+        # Skips a name that differs from an earlier name only in a way that some file systems
+        # ignore, such as letter case, and names that lead to other folders.
         if mesh not in meshes or not is_file_name(name) or folded(name) in taken:
             continue
         data = [_data(p, path, key) for p, path in zip(parents, paths, strict=True)]
