@@ -150,8 +150,10 @@ def _aligned(
 ) -> list[Phoneme] | None:
     """The transcript's phonemes with times, or None if too few of its words are heard.
 
-    Phonemes are recognised in pieces where the alignment of phonemes fails and, if the words of
-    the transcript do not match the voice exactly, in the gaps between the words that are heard.
+    The voice is cut into pieces, and the phonemes of each piece are aligned. Phonemes are
+    recognised without the transcript in pieces whose alignment fails. If the words of the
+    transcript do not match the voice exactly, they are also recognised in the gaps between the
+    words that are heard.
 
     Args:
         recogniser: decoders.
@@ -212,7 +214,8 @@ def _shifted(found: Sequence[Phoneme], begin: float, end: float) -> list[Phoneme
 def _loose_pieces(
     segments: Sequence[Segment], duration: float
 ) -> list[tuple[float, float, list[str]]]:
-    """(begin, end, words) of each piece: runs of adjacent words, and gaps without words.
+    """(begin, end, words) of each piece, in seconds. A piece is a run of adjacent words, or a gap
+    without words.
 
     Args:
         segments: the words that were heard, with times.
@@ -266,7 +269,8 @@ def _word_pieces(
 ) -> Iterator[tuple[float, float, list[str]]]:
     """(begin, end, words) of each piece, in seconds; pieces are cut in the middle of pauses.
 
-    They cover the whole duration, or end in the middle of the last pause if no word follows it.
+    The pieces cover the whole duration, or end in the middle of the last pause if no word follows
+    this pause.
 
     Args:
         segments: all words with times, and silences between them.
