@@ -192,12 +192,13 @@ def gaussian(clip: Clip, width: float) -> Clip:
 
 
 def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
-    """Smooths with a OneEuro filter, frame by frame, as the live viewer does.
+    """Smooths with a one-euro filter, frame by frame, as the live capture does.
 
     Args:
         clip: any clip.
-        cutoff: cutoff frequency of `OneEuro` at speed 0, in Hz; lower is smoother.
-        beta: increase of the cutoff with speed, Hz per (unit per second).
+        cutoff: cutoff frequency of the filter while a value does not change, in Hz; lower is
+            smoother.
+        beta: increase of the cutoff frequency with the speed of a value, Hz per (unit per second).
     """
     running = OneEuro(cutoff, beta)
     rows = [running(t, v) for t, v in zip(clip.frame_times(), clip.curves.T, strict=True)]

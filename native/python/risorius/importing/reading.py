@@ -170,7 +170,8 @@ class Imported:
 def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
     """Keeps the requested angles of head and eyes.
 
-    Head angles that are all 0 are dropped, because their curves would only keep the head still.
+    If all head angles are 0 in all frames, they are dropped, because the capture did not record
+    them and their curves would keep the head still.
 
     Args:
         done: the mapped clip.

@@ -121,8 +121,8 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
 
 
 def _shares(mix: Mix, masks: Masks, mesh: int) -> Doubles:
-    """float64[P]: the parents' shares in a mesh's textures. A rigid mesh has the shares of its
-    region."""
+    """float64[P]: the parents' shares in a mesh's textures: for a rigid mesh the shares of its
+    region, for any other mesh the shares of the whole face."""
     part = masks.meshes[mesh] if mix.regions else np.zeros((0, 1))
     rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
     return np.asarray(mix.table()[int(part[0].argmax())] if rigid else mix.whole())

@@ -358,7 +358,8 @@ def bun(surface: Surface, person: Person) -> Strips:
     sway = 0.05 * random.normal(0, 1, (n, 3))
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    # Looseness of the hair: from 0 at the height of the eyes to 1 at 0.4 dm above the eyes.
+    # Fullness of the hair, which makes it stand off the head: from 0 at the height of the eyes to 1
+    # at 0.4 dm above the eyes.
     full = smooth_step(man[:, 1] / 0.4)
     rise = np.radians(random.uniform(3, 9, n) + 9 * full), np.zeros(n)
     above = _scalp_vertices(surface)

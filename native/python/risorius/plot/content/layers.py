@@ -44,7 +44,8 @@ class Layer:
 
 @dataclass(frozen=True)
 class Extras:
-    """Numbers that only the layers of newer files state: network controls, RBF poses, networks."""
+    """Numbers from layers that old files do not have: controls that networks write, controls that
+    RBF poses write, and networks."""
 
     ml_controls: int
     rbf_poses: int
