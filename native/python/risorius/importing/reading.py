@@ -276,7 +276,7 @@ def read(
         found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
-    # This happens, for example, if a number in the file causes an overflow.
+    # A reader may raise these errors, for example if a number in the file causes an overflow.
     except (ValueError, ArithmeticError) as error:
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:

@@ -81,7 +81,7 @@ class Table:
         """
         text = self.rows[row][column].strip()
         if "." not in text and (self.delimiter != "," or not self.has_points):
-            # a decimal comma, which spreadsheets of many countries write
+            # The comma is a decimal comma, which spreadsheets of many countries write.
             text = text.replace(",", ".")
         return number(text, self.name, self.lines[row], self.place(column))
 

@@ -90,7 +90,7 @@ class Leaving:
         held: list[tuple[Ints, Doubles]],
         importance: Doubles,
     ) -> None:
-        """Starts with all joints.
+        """Prepares the removal; no joint is removed yet.
 
         Args:
             products: float64[J, 4, J, 4]: for each pair of joints the product A^T B of their 3 x 4

@@ -560,7 +560,8 @@ def _moved(
 
 
 def _usual(surface: Surface) -> npt.NDArray[np.bool_]:
-    """bool[R]: True except for components of rotations."""
+    """bool[R]: the raw controls that may change by default: all except components of joint
+    rotations."""
     parts = {f"{stem}{part}" for stem in (".", ".q") for part in "xyzw"}
     names = surface.rig.raw_control_names
     return np.array([not any(name.endswith(part) for part in parts) for name in names], bool)

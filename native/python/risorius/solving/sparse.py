@@ -199,7 +199,7 @@ def cheapest_change(
     aim = aim + tolerance if alone < 0 else min(alone + tolerance, aim + max(worth, tolerance))
     way, near = float(np.linalg.norm(b)), nearest if alone < 0 else alone
     if nearest > _FAR * way and near - nearest <= _FAR * way:
-        # The target is out of reach: controls that hardly help are left out.
+        # The target is out of reach, so controls that hardly bring the point nearer are left out.
         there = _at_price(nodes, prices, calm)
         aim = max(aim, there) if there - near <= _LITTLE * (way - near) else aim
     # Rounding errors could leave the bounds.

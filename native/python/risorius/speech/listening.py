@@ -23,7 +23,8 @@ STEP = 0.01
 """Seconds between two values of a loudness curve."""
 
 _PIECE = 12.0  # seconds: smallest length of a piece, if pauses allow it
-# Seconds: longest piece of `pieces`, to limit the decoder's memory; aligned pieces may be longer.
+# Seconds: longest piece that pieces() makes, to limit the decoder's memory. The pieces in which a
+# transcript is aligned may be longer.
 _LONGEST_PIECE = 30.0
 _PAUSE = 0.15  # seconds: shortest silence in which the voice may be cut
 _SHORTEST_SILENCE = 0.08  # seconds: shorter silences are not removed from phonemes

@@ -181,7 +181,8 @@ class _Finder:
 
 
 def _squared(mask: Pixels) -> Pixels:
-    """uint8[_TILE, _TILE]: a mask resampled to the nearest pixels."""
+    """uint8[_TILE, _TILE]: a mask, halved while it is larger and then sampled at the nearest
+    pixels."""
     small = halved(mask, _TILE)
     row, column = ((np.arange(_TILE) * size // _TILE).astype(np.int64) for size in small.shape)
     return small[row[:, None], column[None, :]]

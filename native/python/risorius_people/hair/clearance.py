@@ -213,8 +213,8 @@ class _Posed:
     def _carried(self, strips: Strips) -> Floats:
         """float64[n, rows, 2, 3]: positions of the left and right edges in the pose.
 
-        The edges move like cards that follow their roots: with the joints of the skin there, and
-        rotated if a blend shape tilts the skin.
+        The edges move like cards that follow their roots: with the joints that move the skin at the
+        root, and rotated if a blend shape tilts the skin.
         """
         ground = self._ground
         roots = ground.roots(strips)

@@ -374,7 +374,7 @@ def mouth_parts(base: BaseMesh, lod: int) -> list[Part]:
 
 
 def joined(parts: list[tuple[Polygons, Operator]]) -> tuple[Polygons, list[Operator]]:
-    """Joins meshes into one, and their operators as well.
+    """Joins meshes into one mesh, and their operators into one operator, returned as a list.
 
     Args:
         parts: the meshes, each with the operator that makes its vertices.

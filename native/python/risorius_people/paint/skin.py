@@ -19,7 +19,8 @@ from .places import HAIRLINES, beard_density, brow_density, hairline_height, thi
 from .raster import Raster
 
 HEAD_SIZE = 2048
-# Absorption of linear red, green and blue by a unit of each pigment.
+# Absorption of linear red, green and blue by a unit of a pigment: melanin, blood in veins under the
+# skin, and the skin's yellow.
 _MELANIN = np.array([0.42, 0.70, 1.0], np.float32)
 _VEINS = np.array([0.42, 0.26, 0.10], np.float32)
 _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
@@ -42,7 +43,7 @@ def encoded(light: Floats) -> Floats:
 
 
 def depth_of(person: Person) -> float:
-    """Darkness of a person's skin, 0 to 1."""
+    """Darkness of a person's skin, from 0 (light) to 1 (dark)."""
     light = float(linear(np.array(person.skin)) @ [0.21, 0.72, 0.07])
     return float(smooth(0.42, 0.06, np.array(light)))
 
