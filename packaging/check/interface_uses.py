@@ -62,7 +62,7 @@ def uses_in(paths: list[Path], texts: set[str]) -> dict[str, list[Use]]:
 
 
 def _panels(sources: list[Source]) -> dict[str, set[str]]:
-    """Labels of the panels that show a property or an operator, by its name in the code."""
+    """Name of a property or an operator in the code -> labels of the panels that show it."""
     out: dict[str, set[str]] = defaultdict(set)
     for source in sources:
         for node in ast.walk(source.tree):
@@ -77,7 +77,7 @@ def _panels(sources: list[Source]) -> dict[str, set[str]]:
 
 
 def _kind(source: Source, node: ast.Constant) -> str:
-    """The kind of text of a literal, with the label of the property or the choice."""
+    """The kind of a text, such as "label"; a tooltip also names its property or choice."""
     inner: ast.AST = node
     for outer in source.around(node):
         if isinstance(outer, ast.keyword) and outer.arg in _LABELS | {"description"}:
@@ -126,7 +126,7 @@ def _kind_of_argument(source: Source, argument: ast.keyword) -> str:
 
 
 def _kind_by_function(source: Source, node: ast.AST) -> str:
-    """The kind of a text without a keyword: `poll` explains a button that is greyed out."""
+    """The kind of a text, from the call or function around it, for example `poll`."""
     for outer in source.around(node):
         if isinstance(outer, ast.Raise):
             return "message"
