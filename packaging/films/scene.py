@@ -124,7 +124,7 @@ def meet_eyes():
 
 
 def darken(scene):
-    """Give the scene a dark world, which lights the face hardly at all."""
+    """Give the scene a dark world, which adds almost no light to the face."""
     world = bpy.data.worlds.new("Stage")
     scene.world = world
     world.use_nodes = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Opens pages with three.js clients in chromium, and compares their vertices with the file."""
+"""Opens pages with three.js in chromium, and compares their vertices with the exported file."""
 
 from __future__ import annotations
 

@@ -83,7 +83,10 @@ def try_old(read: Any, own: Any) -> tuple[int, int, str]:
 
 
 def moved(found: GlbFile, mesh: str) -> float:
-    """The largest difference of a coordinate between shape keys and the file's targets, in mm."""
+    """The largest difference in mm between a mesh's shape keys and the targets of the file.
+
+    The x, y and z of each vertex's displacement are compared.
+    """
     data: Any = bpy.data.objects[mesh].data
     if data.shape_keys is None:
         assert not found.names(mesh)

@@ -115,7 +115,10 @@ def commands() -> str:
 
 
 def python_item(module: ModuleType, name: str) -> str:
-    """The entry of a public name in Markdown: a class or function by reference, or a value as text.
+    """The Markdown entry of a public name.
+
+    For a class or function it is a line "::: NAME", which mkdocstrings replaces by the docstring;
+    for a value, it is the value as text.
 
     Args:
         module: the module that exports the name.
