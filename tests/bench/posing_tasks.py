@@ -246,7 +246,14 @@ def by_board(table, board, unit, away, goal):
 
 
 def by_drags(face, goal, moving, most):
-    """(cost, raw controls) of at most `most` skin drags; each is the drag with the best result."""
+    """(cost, raw controls) of setting a pose by skin drags; each is the drag with the best result.
+
+    Args:
+        face: the face.
+        goal: float64[R], raw controls of the pose.
+        moving: bool[V], vertices that the pose moves by more than 0.1 mm.
+        most: largest number of drags.
+    """
     done, raw = Done(), np.zeros_like(goal)
     wanted = face.at(goal)
     mirrored = is_mirrored(face, goal)
@@ -269,10 +276,11 @@ def is_mirrored(face, goal):
 
 
 def best_drag(face, raw, wanted, moving, mirrored):
-    """(error in mm, raw controls, start, target, key events) of the best drag.
+    """(error in mm, raw controls, start, target, key events) of the drag that leaves the least
+    error.
 
-    Start and target are places of the dragged vertex. None if no moving vertex that is shown is
-    away from its target.
+    Start and target are places of the dragged vertex. Returns None if every visible vertex that the
+    pose moves is already at its target.
     """
     here = face.at(raw)
     off = np.linalg.norm((wanted - here) @ face.screen.T, axis=1) * (moving & face.shown)

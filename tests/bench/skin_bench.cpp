@@ -50,8 +50,9 @@ struct Problem {
   core::AlignedVector<float> rows;
 };
 
-// A mesh with random weights. In: spread  number of neighbouring bones from which a vertex's bones
-// are chosen; kBones: all bones
+// A mesh with random weights.
+// In: spread  number of neighbouring bones from which the bones of a vertex are chosen; kBones: the
+//             bones are chosen from all bones
 Problem make_problem(std::uint32_t spread) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> any(0.01f, 1.0f);

@@ -128,7 +128,7 @@ TEST(ClipFile, PairsOfMetadataAreLimited) {
 }
 
 // Each name repeats the previous one and adds a letter, which takes only 3 bytes of the file.
-// Together the names exceed the limit.
+// Together the names exceed a limit of 1 MB for the memory of the head.
 TEST(ClipFile, NamesThatGrowOutOfFewBytesAreLimited) {
   Clip clip;
   std::string name;

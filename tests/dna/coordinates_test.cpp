@@ -108,8 +108,8 @@ void expect_vectors(const Vec3Array& before, const Vec3Array& after, const Matri
   }
 }
 
-// Three angles of up to 180 degrees in float32 have an error of less than 2 eps pi together; 8 eps
-// is above that.
+// Three angles of up to 180 degrees in float32 have together an error of less than 2 eps pi
+// radians. The elements of the rotation matrices may differ by 8 eps, which is more than this.
 void expect_rotation(const Dna& from, const Row& before, const Dna& to, const Row& after) {
   const Matrix expected = Change(from, to).rotation(rotation_of(from, before));
   const Matrix result = rotation_of(to, after);
@@ -268,7 +268,7 @@ void expect_group(const Dna& from, const Dna& to) {
         EXPECT_NEAR(b[i], translation[i] * change.unit, 200 * kEps);
         EXPECT_EQ(std::abs(b[6 + i]), std::abs(scale[i]));
       }
-      // Each scale delta of the source is in the result once, with its sign.
+      // The three scale deltas of the source occur once each in the result, and keep their signs.
       EXPECT_TRUE(std::is_permutation(a.begin() + 6, a.end(), b.begin() + 6));
       expect_rotation(from, {a[3], a[4], a[5]}, to, {b[3], b[4], b[5]});
     }

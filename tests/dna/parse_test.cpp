@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Bytes worked out by hand from the format, so that parser and writer do not only confirm each
-// other; and promises about hostile input that only native code can check.
+// Compares the parser and the writer with bytes that were worked out by hand from the format, so
+// that they do not only confirm each other. Also checks promises about hostile input that only
+// native code can check.
 #include "dna/file/parse.h"
 
 #include <gtest/gtest.h>

@@ -44,7 +44,10 @@ def sources(root: Path, part: str) -> dict[str, str]:
 
 
 def room_of(path: str, rooms: Mapping[str, object]) -> str | None:
-    """The room of a file, a key of `rooms`: its path or its folder's path; None if neither is."""
+    """The room of a file: its path or the path of its folder, whichever is a key of `rooms`.
+
+    None if neither is a key.
+    """
     folder = PurePosixPath(path).parent.as_posix()
     return next((room for room in (path, folder) if room in rooms), None)
 

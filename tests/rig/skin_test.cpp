@@ -202,7 +202,8 @@ struct Mesh {
   }
 };
 
-// A mesh with random influences. In: counts  numbers of influences, which the vertices get in turn
+// A mesh with random influences.
+// In: counts  vertex v has counts[v % counts.size()] influences
 Mesh random_mesh(std::size_t vertices, std::span<const std::uint32_t> counts, std::uint32_t bones,
                  std::uint32_t seed) {
   std::mt19937 random(seed);

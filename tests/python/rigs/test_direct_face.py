@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""DirectFace computes final vertices like the oracle, writes only changes, refuses bad input."""
+"""Tests DirectFace: its final vertices equal the oracle's, and bad input is refused.
+
+Only meshes that have changed are written.
+"""
 
 import re
 import sys

@@ -161,7 +161,7 @@ class Face:
         sure = np.nonzero(~vague)[0]
         a, b = self.quaternions(actual[sure]), self.quaternions(wanted[sure])
         error = np.minimum(np.abs(a - b).max(1), np.abs(a + b).max(1))
-        # if the cosine of the middle Euler angle is near 0, half of the digits are lost
+        # If the cosine of the middle Euler angle is near 0, half of the digits are lost.
         pole = np.where(self.near_pole(wanted[sure]), 1e-3, 0)
         bad = np.nonzero(error > 0.5 * scale * bounds[sure, 3:6].sum(1) + 5e-6 + pole)[0]
         assert bad.size == 0, (
