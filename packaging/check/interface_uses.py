@@ -3,7 +3,9 @@
 
 A use is the kind of the text (label, tooltip, message), with the names that a user sees around it:
 the label of the operator, panel or property, and the panels that contain the button or the value.
-Descriptions of the class, the function and the file stand for the user's situation.
+The
+descriptions of the class, the function and the file are added, because they explain in which
+situation a user sees the text.
 """
 
 import ast
@@ -179,7 +181,10 @@ def _constant(source: Source, node: ast.Constant) -> Iterator[str]:
 
 
 def _code_names(node: ast.AST) -> list[str]:
-    """The names by which a panel shows a property or an operator."""
+    """The name of a property, or the bl_idname of an operator, by which panels refer to it.
+
+    Empty for nodes that define neither.
+    """
     if isinstance(node, ast.AnnAssign):
         return [ast.unparse(node.target)]
     return [_value(node, "bl_idname")] if isinstance(node, ast.ClassDef) else []

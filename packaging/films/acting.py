@@ -118,7 +118,7 @@ TRACKS = {
     "mouthPressU*": [(52, 0), (54, 0.35), (56, 0), (64, 0), (67, 0.4), (70, 0), (96, 0)],
     "mouthPressD*": [(52, 0), (54, 0.35), (56, 0), (64, 0), (67, 0.4), (70, 0), (96, 0)],
     "mouthLowerLipRollIn*": [(60, 0), (62, 0.45), (64, 0), (96, 0)],
-    # An angry shout, with the controls that this face has.
+    # An angry shout. Tracks without a control of the demo's face have no effect.
     "jawOpenExtreme": [(70, 0), (76, 0.9), (88, 1.0), (96, 0.6)],
     "neckStretch*": [(68, 0), (76, 0.9), (88, 1.0), (96, 0.7)],
     "noseWrinkle*": [(64, 0), (70, 0.5), (76, 1.0), (90, 0.9), (96, 0.7)],

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Fits of joints to shapes that were made with known joints.
+// Tests fits of joints to shapes that were made with known joints.
 #include "author/fit.h"
 
 #include <gtest/gtest.h>

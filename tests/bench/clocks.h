@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Clocks that the benchmark library lacks.
+// Measures durations by clocks that the benchmark library lacks.
 #pragma once
 
 #include <benchmark/benchmark.h>

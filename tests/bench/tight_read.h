@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The least work of an evaluation: reading the columns of the active controls.
+// Reads only the columns of the active controls, which is the least work of any evaluation.
 #pragma once
 
 #include <cstddef>

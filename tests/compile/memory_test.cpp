@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Heap memory of compile in proportion to the size of the face.
+// Tests that compile() takes heap memory in proportion to the size of the face.
 #include <gtest/gtest.h>
 
 #include "compile/compile.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Files that are cut short, patched and malformed: each gives a Dna that is usable in every way, or
-// an error with a field and an offset.
+// Tests files that are cut short, patched or malformed. Each must give a Dna that can be used in
+// every way, or an error with a field and an offset.
 #include <gtest/gtest.h>
 
 #include <cstring>

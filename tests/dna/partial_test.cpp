@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which bytes of a file a partial load reads, and how often. The positions of layers, meshes and
-// lists come from the file's index and the sizes in the format, not from the parser.
+// Tests which bytes of a file a partial load reads, and how often. The positions of layers, meshes
+// and lists come from the file's index and the sizes in the format, not from the parser.
 #include <algorithm>
 #include <fstream>
 #include <iterator>

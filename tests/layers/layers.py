@@ -93,7 +93,8 @@ def _joined(folder: PurePosixPath, name: str) -> str:
 def imported(path: str, text: str, name: str, files: frozenset[str]) -> Iterator[Use]:
     """Yields imports of a Python file, including the ones in functions and by import_module.
 
-    Imports of the standard library are omitted. Code that is run from a text is "unreadable".
+    Imports of the standard library are omitted. A call that runs code from a string, such as eval,
+    is an import whose name cannot be read.
 
     Args:
         path: path of the file below the package's folder.

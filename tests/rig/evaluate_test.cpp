@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The semantics of each stage, on faces small enough to compute by hand.
+// Tests each stage of an evaluation on faces that are small enough to compute by hand.
 #include "rig/stages/evaluate.h"
 
 #include <algorithm>

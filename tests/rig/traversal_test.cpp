@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The orders in which columns of the joint groups are visited: only the columns of active controls,
-// listed or added one by one, or all columns.
+// Tests the three ways to visit the columns of the joint groups. kListed lists the columns of
+// active controls, kAdded adds these columns one by one, and kWhole visits all columns.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Least squares with bounds: a strictly convex problem has one solution, and the conditions of
-// Karush, Kuhn and Tucker identify it.
+// Tests least squares with bounds. Each problem is strictly convex, so it has one solution, which
+// the conditions of Karush, Kuhn and Tucker identify.
 #include "solve/bounded.h"
 
 #include <gtest/gtest.h>

@@ -98,7 +98,7 @@ def stretched(points):
 
 
 def posed(dna, mesh, **raw):
-    """float64[V, 3]: posed vertices, computed by the oracle and by the skinning of the tests.
+    """float64[V, 3]: posed vertices, computed without the package by oracle.py and skin_oracle.py.
 
     Args:
         raw: raw control without prefix -> value; the others keep their initial values.

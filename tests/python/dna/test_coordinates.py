@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Compares conversions of axes and units with matrices, the reference reader and posed faces."""
+"""Compares conversions of axes and units with matrices, the reference's reader and posed faces.
+
+The reference is OpenRigLogic, which computed the values of tests/data/golden.
+"""
 
 import gzip
 import itertools

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests LOD filters: the result is a complete file with meshes and motion of the original."""
+"""Tests LOD filters: the result is a complete file with meshes and motion of the original.
+
+The reference in comments is OpenRigLogic, which computed the values of tests/data/golden.
+"""
 
 import numpy as np
 import pytest

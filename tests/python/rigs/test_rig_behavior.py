@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Compares networks, solvers, setups and quaternions with the reference's values at every LOD.
+"""Compares networks, RBF solvers, twist and swing setups, and quaternions with the reference.
+
+Each LOD is compared. The reference is OpenRigLogic, which computed the values of tests/data/golden.
 
 Values in which the reference is known to deviate are not compared:
 

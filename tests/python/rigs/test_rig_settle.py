@@ -2,7 +2,8 @@
 """Tests settled poses of random chains of correctives, networks and solvers.
 
 Most nodes are read by nodes that a frame evaluates earlier, so that a pose settles only after
-several frames. The expected pose is a frame of the oracle, repeated until nothing changes.
+several frames. The expected pose is computed by oracle_behavior.py in double precision: it repeats
+a frame until no control changes.
 """
 
 import numpy as np

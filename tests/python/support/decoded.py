@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Converts a Dna to the JSON form of the reference's golden files, by index or by name.
 
-A LOD filter of the reference does not renumber some indices of the complete file, so filtered files
-are compared by the names of the elements.
+The reference is OpenRigLogic, which computed the values of tests/data/golden. Its
+LOD filter does not renumber some indices of the complete file, so filtered files are compared by
+the names of the elements.
 """
 
 import gzip

@@ -3,9 +3,10 @@
 
     python tests/python/support/make_selftest.py
 
-For each face of COMES_FROM, stores the reference's values for some of its cases at every LOD. Cases
-that the reference is known to evaluate differently (test_rig_behavior.py explains them) are
-omitted, and their number is printed. If a later run omits more cases, Risorius has a new fault.
+The reference is OpenRigLogic, which computed the values of tests/data/golden. For each face of
+COMES_FROM, stores the reference's values for some of its cases at every LOD. Cases that the
+reference is known to evaluate differently (test_rig_behavior.py explains them) are omitted, and
+their number is printed. If a later run omits more cases, Risorius has a new fault.
 """
 
 import hashlib
