@@ -92,8 +92,16 @@ TASKS: dict[str, dict[str, float]] = {
 
 @dataclass
 class Done:
-    """The cost of a pose: events of the mouse button (openings: those that opened a region), events
-    of keys, the pointer's path in pixels and its position, and the remaining error in mm."""
+    """The cost of a pose.
+
+    Attributes:
+        events: number of presses and releases of the mouse button.
+        keys: number of key events.
+        openings: how many of `events` opened a region of sliders.
+        pixels: length of the pointer's path.
+        error: remaining error in mm.
+        at: place of the pointer in pixels.
+    """
 
     events: int = 0
     keys: int = 0

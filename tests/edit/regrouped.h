@@ -37,8 +37,8 @@ inline std::vector<float> joints_of(const dna::Dna& dna, const std::vector<float
   return evaluate_once(rig.value(), raw, lod).joints;
 }
 
-// Expects that two faces give the same joints to the last bit, at every LOD and for both forms of
-// rotation.
+// Expects that two faces give the same joints to the last bit for the raw controls `raw`, at every
+// LOD, with rotations as Euler angles and as quaternions.
 inline void expect_same_function(const dna::Dna& a, const dna::Dna& b,
                                  const std::vector<float>& raw) {
   for (std::uint32_t lod = 0; lod < a.descriptor.lod_count; ++lod) {

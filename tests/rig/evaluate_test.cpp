@@ -59,9 +59,9 @@ TEST(EvaluateJoints, LastGroupThatWritesARowWins) {
   EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}, 1).joints[4], 1.0f) << "no row at this LOD";
 }
 
-// Of four joints the first rotates at both LODs, the second only at LOD 0, the third only moves and
-// the fourth does nothing. Each joint must get the w of its quaternion, whatever the memory of the
-// pose contained before.
+// Of four joints, the first rotates at both LODs, the second only at LOD 0, the third is only
+// translated, and the fourth does not move. Each joint must get the w of its quaternion, whatever
+// the memory of the pose contained before.
 TEST(EvaluateJoints, EveryQuaternionHasItsW) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups =

@@ -425,8 +425,8 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
   }
 }
 
-// Rotations are computed together with others, large angles with small ones. Each must have the
-// bits that it has alone.
+// Several rotations are computed in one call, with large and small angles. Each result must have
+// the same bits as if the rotation were computed alone.
 TEST_P(SimdKernels, TurnRotationsTogetherAsAlone) {
   constexpr std::size_t kCount = 700, kStride = 10;
   std::mt19937 random(12);

@@ -208,7 +208,8 @@ async def try_gaze(shown: Shown, found: GlbFile) -> None:
 
 
 def turned(rest: Any, at: Any) -> Any:
-    """float64[3, 3]: the rotation that best moves an eye's neutral vertices onto the posed ones.
+    """float64[3, 3]: the rotation that best moves an eye's neutral vertices onto its posed
+    vertices.
 
     Args:
         rest: neutral vertices [V, 3].

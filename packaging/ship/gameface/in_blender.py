@@ -3,7 +3,7 @@
 
 MODULES is the folder into which pip installed bpy-vrm-format. Checks that Blender's bones,
 expressions, licence and look-at equal those of the file, and that each shape key moves the vertices
-by the file's numbers.
+as the morph target in the file does.
 """
 
 from __future__ import annotations

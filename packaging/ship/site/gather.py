@@ -131,7 +131,7 @@ def python_item(module: ModuleType, name: str) -> str:
 
 
 def python_api() -> str:
-    """The page on the Python API: the names of `risorius`, then those of single modules."""
+    """The page on the Python API: the names of `risorius`, then the names of single modules."""
     import risorius
 
     parts = [

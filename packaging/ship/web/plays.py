@@ -197,7 +197,7 @@ async def _dropped(one: Browser, file: Path, clip: risorius.Clip, face: Path) ->
 
 
 async def _touch(one: Browser, page: Path) -> str:
-    """Check touch in an emulated phone: turn by one finger, zoom by two, drag a slider."""
+    """Check touch in an emulated phone: one finger turns the face or drags a slider, two zoom."""
     await _open(one, page, 390, 844, phone=True)
 
     async def strokes(*fingers: tuple[tuple[int, int], tuple[int, int]]) -> None:

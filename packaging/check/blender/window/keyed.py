@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests that keyframes are visible in the timeline, and that a tweak layer receives new ones."""
+"""Tests that keyframes are visible in the timeline, and that new ones go into an open tweak."""
 
 from __future__ import annotations
 
