@@ -242,7 +242,7 @@ class Suite {
   }
 
  private:
-  // Adds a row of the table. Out: the row's name
+  // Adds a row of the table. Returns the row's name.
   const std::string& row(const std::string& name, const std::string& base = "",
                          const std::string& asked = "", const std::string& read = "",
                          double bytes = 0) {

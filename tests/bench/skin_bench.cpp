@@ -27,7 +27,8 @@ struct Times {
 };
 
 // Measures each step `rounds` times, in turn with the others, so that other load of the machine
-// affects all steps alike. Out: median and least time of each step, in us
+// affects all steps alike.
+// Out: median and least time of each step, in us
 std::vector<Times> measure(const std::vector<std::function<void()>>& steps, std::size_t rounds) {
   std::vector<std::vector<double>> all(steps.size());
   for (std::size_t r = 0; r < rounds; ++r) {

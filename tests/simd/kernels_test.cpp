@@ -371,7 +371,8 @@ struct Turn {
 };
 
 // The quaternion (x, y, z, w) of three rotations about x, y and z, computed in double. turn.order
-// is the order in which they are applied. In: angles  float[3], radians about x, y and z
+// is the order in which they are applied.
+// In: angles  float[3], radians about x, y and z
 std::array<double, 4> product_of_turns(const Turn& turn, const float* angles) {
   std::array<double, 4> q{0, 0, 0, 1};
   for (const std::uint8_t axis : turn.order) {
