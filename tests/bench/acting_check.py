@@ -33,7 +33,7 @@ _ROOT = 0.5  # mm; hair vertices nearer to the skin in the neutral pose are root
 
 
 class Points:
-    """The vertices that the checks need in each frame; each is computed once for all checks."""
+    """The vertices that the checks need in each frame. A vertex is computed once for all checks."""
 
     def __init__(self, surface: Any) -> None:
         self._surface, self._rows, self._where = surface, [], {}

@@ -35,7 +35,7 @@ def worlds(dna: risorius.Dna) -> np.ndarray:
 
 
 class Maker:
-    """Makes faces of a file; they share the rig, the bone space and the meshes."""
+    """Makes faces of one DNA file. All these faces share the rig, the bone space and the meshes."""
 
     def __init__(self, dna: risorius.Dna) -> None:
         self.rig = risorius.Rig(dna)

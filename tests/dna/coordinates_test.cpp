@@ -465,8 +465,8 @@ TEST(DnaCoordinates, ARowStaysInItsLods) {
   dna.descriptor.lod_count = 3;
   dna.behavior.joint_groups =
       std::vector<JointGroup>{make_group({4, 2, 0}, {3, 9, 1, 17}, {1, 2, 3, 4, 5, 6, 7, 8})};
-  // The source has x right, y up, z front; the result has x front, y right, z up. The axes rotate,
-  // so that the order xyz becomes yzx.
+  // The source has x right, y up, z front; the result has x front, y right, z up. So x becomes y, y
+  // becomes z and z becomes x, and the rotation order xyz becomes yzx.
   const Dna out = converted(dna, target_of({4, 1, 2}, 3, {1, 1, 1}));
   const JointGroup& g = out.behavior.joint_groups[0];
   EXPECT_EQ(g.lods, (Array<std::uint16_t>{4, 2, 0}));
@@ -732,7 +732,8 @@ TEST(DnaCoordinates, NumbersThatAreNoneStaySo) {
   CoordinateTarget target = target_of({4, 1, 3}, 5, {1, -1, 1});
   target.translation_unit = 0;
   const Dna out = converted(dna, target);
-  // x (right) becomes y, y (up) becomes -z, and z (front) becomes x; metres become centimetres.
+  // The conversion: x (right) becomes y, y (up) becomes -z, z (front) becomes x, and metres become
+  // centimetres.
   const Array<float>& t = out.definition.neutral_joint_translations.values;
   const std::vector<float> expected{200,       300,  -kInfinity, kNan, kInfinity,
                                     kInfinity, -100, kInfinity,  kNan};

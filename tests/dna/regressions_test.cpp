@@ -118,8 +118,8 @@ TEST(FuzzFind010, RefusesToCompileMoreControlsThanIndicesReach) {
   EXPECT_EQ(promises::evaluation(*dna, 0), "");
 }
 
-// The fault: there was one finding for each LOD whose rows exceed the table, which together took
-// many times the file's size.
+// The fault: there was one finding for each LOD whose number of rows exceeds the table. Together
+// the findings took many times the file's size in memory.
 TEST(FuzzFind011, SaysOnceWhatIsWrongWithTheLevelsOfATable) {
   const auto findings = checked(find("011-rows-of-levels-beyond-the-table.dna"));
   const auto of_levels = [](const dna::Finding& f) {

@@ -61,8 +61,8 @@ inline dna::Dna two_joints() {
   return dna;
 }
 
-// Twelve joints in one region. Control 0 moves all of them, joint 5 by `small`. Control 1 moves
-// joint 3 by `small` and joint 4 by `large`; it is foreign to the region.
+// Twelve joints in one region. Control 0 moves all of them, joint 5 by `small`. Control 1,
+// which is foreign to the region, moves joint 3 by `small` and joint 4 by `large`.
 inline dna::Dna with_outliers(float small, float large) {
   dna::Dna dna = make_face(2, 0, 12);
   Indices outputs;

@@ -24,7 +24,7 @@ FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 
 
 def listed(nav: str) -> list[str]:
-    """The pages in the navigation that are files of the project, and not made by this script.
+    """The pages in the navigation that are files of the project; generated pages are left out.
 
     Args:
         nav: text of mkdocs.yml.

@@ -119,7 +119,7 @@ def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
 
 
 def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
-    """If a hair bends back over its root, left and right of its card must not swap."""
+    """If a hair bends back over its root, the left and right edge of its card must not swap."""
     roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(3))
     roots = roots.taken(np.arange(1))
     points = np.array([[[0, 0, 0], [0.1, 0, 0.1], [0.1, 0, 0.3], [-0.1, 0, 0.3], [-0.3, 0, 0.2]]])
