@@ -24,7 +24,7 @@ _NEAR = 0.3  # cm: distance of that point at which the weight of its value is 1/
 _UNSURE = 0.5  # least trust of a template vertex, for vertices that only followed their neighbours
 _EVENED = 0.02  # cm: smoothing radius of the values
 _ASIDE = 0.3  # cm: smoothing radius of the values with which outliers are compared
-_OUTLIER = 0.4  # of a pose's longest displacement: deviation at which a weight is quartered
+_OUTLIER = 0.4  # of a pose's longest displacement: deviation at which a weight is an eighth
 _ROUNDS = 3  # of the search for outliers
 _AT_REST = 1e-7  # of the area: weight of the value 0, for vertices without known neighbours
 
@@ -102,7 +102,7 @@ class Spreading:
             tell((number + 0.5) / _ROUNDS)
             even = solver.solve(values * held[:, None], self._threads)
             off = np.linalg.norm((values - even).reshape(len(values), -1, 3), axis=2) / longest
-            fits = np.square(1.0 / (1.0 + np.square(off.max(axis=1) / _OUTLIER)))
+            fits = (1.0 + np.square(off.max(axis=1) / _OUTLIER)) ** -3.0
         return fits
 
     def _values(self, values: Doubles) -> Doubles:
