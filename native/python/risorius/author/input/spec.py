@@ -99,6 +99,7 @@ class Read:
         odd: sentences on unusual, guessed or left-out parts.
         materials: name of a mesh -> its material.
         kept: parts of the names of meshes that keep their joints, see RigOptions.
+        template: face whose animated maps the finished rig gets; None: the rig keeps its maps.
     """
 
     dna: Dna
@@ -106,6 +107,7 @@ class Read:
     odd: list[str]
     materials: dict[str, Material] = field(default_factory=dict)
     kept: tuple[str, ...] = ()
+    template: Dna | None = None
 
 
 def read_spec(path: Path) -> Spec:
