@@ -32,7 +32,7 @@ sys.path.append(str(HERE.parent / "packaging" / "check"))
 import limits  # noqa: E402
 
 MODULE = "bl_ext.user_default.risorius"
-MAX_GROWTH = 0.03  # share of the used memory that it may grow in the second half of the run
+MAX_GROWTH = 0.03  # of the last sample: allowed growth over the second half of the run
 SECONDS_PER_ACTION = 1.0  # mean CPU time after which the child counts as hung
 
 
@@ -163,7 +163,7 @@ def memory():
 
 
 def growth(values):
-    """Fitted growth over the second half of the samples, in their unit."""
+    """Fitted growth over the second half of the samples, in their unit; 0 if it has less than 4."""
     half = values[len(values) // 2 :]
     if len(half) < 4:
         return 0.0
@@ -245,7 +245,7 @@ class Run:
         self.samples["all left"].append(sum(counts.values()))
 
     def judge(self):
-        """Sentences about growth; too much growth is recorded as an error."""
+        """Texts about the growth of rows of 8 or more samples; too much growth becomes an error."""
         found = []
         for name, row in self.samples.items():
             if name == "at action" or len(row) < 8:
@@ -282,7 +282,7 @@ def plant(world, number):
 
 
 def child(options):
-    """Do the actions in this Blender and write the result to a file."""
+    """Do the actions in this Blender, up to the fifth error, and write the result to a file."""
     folder = options.child
     for place in os.environ.get("RISORIUS_TEST_PATH", "").split(os.pathsep):
         if place:

@@ -384,7 +384,7 @@ def test_what_cannot_be_is_said_in_a_sentence(rig, capture, options, words):
 
 
 def _last_jaw(rig):
-    """Frame and value of the jaw's last key."""
+    """Frame and value of the jaw's last key, with a tolerance of 0.001 for comparisons."""
     action = scene.controls(rig).animation_data.action
     key = next(c for c in _curves(action) if "jawOpen" in c.data_path).keyframe_points[-1]
     return pytest.approx((key.co[0], key.co[1]), abs=1e-3)
@@ -480,7 +480,7 @@ def test_a_capture_as_a_strip_or_a_layer(rig, capture, target):
 
 
 def _arkit_rig():
-    """A mesh as from another tool: shape keys with ARKit's names, one of them driven."""
+    """A triangle as from another tool: keyed shape keys with ARKit's names, and `hat` unkeyed."""
     mesh = bpy.data.meshes.new("Other")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     item = bpy.data.objects.new("Other", mesh)
@@ -565,7 +565,12 @@ def test_a_face_speaks_and_is_heard(rig, voice):
 
 
 def _gives_the_face_back(rig, last):
-    """Check that the face shows the slider values before and after, but not during a voice."""
+    """Check that the face shows the slider values before and after a voice, but not during it.
+
+    Args:
+        rig: face with a layer of a voice that starts at frame 31.
+        last: last frame of the voice.
+    """
     scene.set_controls(rig, mouthCornerPullL=0.6)
     present = scene.submodule("scene.see_why.present")
     shown = {}

@@ -157,7 +157,10 @@ def _entry(rig, **settings):
 
 
 def _performance(rig, rules):
-    """Add layers: speech, a masked expression that fades in, a blink, and fired reactions."""
+    """Add layers: a wave of three sliders, an expression of the mouth, a blink, fired reactions.
+
+    The expression fades in and out. `rules` says whether the rules between layers are on.
+    """
     controls = scene.controls(rig)
     controls.risorius_layer_rules = rules
     _entry(rig, action=_wave(rig, interpolation="LINEAR"), start=3.0, scale=1.5)
@@ -171,7 +174,7 @@ def _performance(rig, rules):
 
 
 def _mixer(rig, rules):
-    """The layers of `_performance` in risorius.Mixer, with times in seconds."""
+    """The layers of `_performance` with the same `rules` as a risorius.Mixer, times in seconds."""
     import risorius
 
     names = scene.submodule("scene.character.runtime").of(rig).labels

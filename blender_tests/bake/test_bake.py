@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests that baked faces move like unbaked faces, by actions only, and can be unbaked."""
+"""Tests that baked faces move like unbaked faces, and can be unbaked.
+
+A bake of the kind RESULT moves bones, shape keys and maps by actions, without the evaluator. A bake
+of the kind CONTROLS moves the controls by an action, and the evaluator still moves the face.
+"""
 
 import addon_utils
 import bpy
@@ -45,7 +49,11 @@ def _bake(rig=None, **options):
 
 
 def _state(rig):
-    """All animation data of a character, and its shape keys, as plain values."""
+    """Actions, NLA tracks, drivers and shape keys of a character, and which meshes are hidden.
+
+    All are plain values for comparisons. Keyframes and strips are not contained, only the number of
+    strips of each track.
+    """
     owners = [rig, scene.controls(rig)]
     owners += [m.data.shape_keys for m in scene.meshes(rig).values() if m.data.shape_keys]
     found = []

@@ -25,7 +25,10 @@ def mode(request):
 
 
 def _has_maps_of_the_frame(rig, item):
-    """Check that the material of a simulated mesh reads the animated maps of each frame."""
+    """Check that the material of a simulated mesh reads the first animated map of the frame.
+
+    The values at frames 1 and 4 must also differ.
+    """
     assert "maps" in item
     material, seen = item.data.materials[0], []
     for frame in (1, 4):

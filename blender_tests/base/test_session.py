@@ -84,7 +84,7 @@ def _fill(dna_file):
     return rig
 
 
-# Entries that must be emptied when a file is loaded.
+# Some of the session's entries that must be emptied when a file is loaded.
 MISSED = (
     "caches.late",
     "controls_ahead.edited",

@@ -11,8 +11,8 @@ from support import scene
 from support.faces import small_face
 
 SIDE = 96
-PICTURE = 30_000  # smallest size in bytes of a PNG with noise
-METADATA = 300_000  # bytes of metadata that cannot be compressed
+PICTURE = 30_000  # approximate size in bytes of a PNG of SIDE x SIDE random pixels
+METADATA = 300_000  # bytes of random metadata, which are hard to compress
 
 
 def _picture(path, seed):

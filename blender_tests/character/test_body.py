@@ -19,7 +19,13 @@ NAMES = {
 
 
 def _body(names, scale=1.0, turn=0.0):
-    """A chain of bones with rolls, at any scale, upright in an object that is rotated about x."""
+    """A chain of bones with rolls, upright in the world, in an object with scale and rotation.
+
+    Args:
+        names: names of the bones from the lowest to the highest; empty names are left out.
+        scale: scale of the object.
+        turn: rotation of the object about x, in radians.
+    """
     data = bpy.data.armatures.new("body")
     body = bpy.data.objects.new("body", data)
     bpy.context.scene.collection.objects.link(body)

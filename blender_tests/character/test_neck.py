@@ -10,7 +10,7 @@ from support import oracle, scene
 from support.faces import HEAD, NECK_POSES, SIDE, TURNING, UP, neck_face
 
 NECK = 1
-NEAR = 4e-3  # tolerance: equal float32 quaternions may differ by an arc of a thousandth
+NEAR = 4e-3  # tolerance: equal float32 quaternions may differ by an angle of 0.001 radians
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def _axes(dna):
 
 
 def _rest(dna, joint):
-    """The axes of a joint at rest in the DNA file's space, float64[3, 3]."""
+    """The axes of a joint at rest in the DNA file's space, as columns, float64[3, 3]."""
     return oracle._world(dna, np.zeros((len(dna.joint_names), 9)))[joint][:3, :3]
 
 

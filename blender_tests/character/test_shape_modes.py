@@ -202,7 +202,7 @@ def test_a_driven_key_set_by_hand_is_not_stuck(dna_file):
 
 
 def _channel_of(rig, path, name, value):
-    """Largest coordinate difference from the oracle's vertices with one channel at `value`."""
+    """Largest coordinate difference of both meshes from the oracle with one channel at `value`."""
     import risorius
     from support import oracle
 

@@ -55,7 +55,10 @@ def drag(offset, vertex=VERTEX, **options):
 
 
 def reach(rig, path, vertex=VERTEX, values=POSE):
-    """The motion of a vertex by sliders according to the oracle, float64[3]."""
+    """The motion of a head vertex if the rig's sliders get `values`, float64[3] in metres.
+
+    The oracle computes it from the DNA file `path`.
+    """
     dna = risorius.load(str(path))
     raw = scene.raw_of(rig, path)
     was = oracle.vertices(dna, HEAD, risorius.Rig(dna).evaluate(raw))[vertex]

@@ -15,7 +15,7 @@ from risorius.web import page as pages
 from support import scene
 from support.animation import animate
 
-EMPTY = "<title>Risorius</title><!--FACE-->"  # a browser tests the real page
+EMPTY = "<title>Risorius</title><!--FACE-->"  # replaces the real page, which is tested in a browser
 ELEMENT = re.compile(r'id="([^"]*)">([^<]*)</script>')
 
 

@@ -234,7 +234,11 @@ def _add(name, geometry, shapes=None, place=(0, 0, 0), parent=None):
 
 @pytest.fixture
 def whole_head():
-    """A head that looks along +Y; teeth with the same shape keys; eyes, hair, and a far cube."""
+    """A head that looks along +Y, teeth with equally named shape keys, eyes, hair, and a far cube.
+
+    All but the cube have the same armature as parent. Head and eyes are selected; the eyes, which
+    have no shape keys, are active. Returns the head.
+    """
     armature = bpy.data.objects.new("Body", bpy.data.armatures.new("Body"))
     bpy.context.scene.collection.objects.link(armature)
     armature.rotation_euler = (0.0, 0.0, np.pi)

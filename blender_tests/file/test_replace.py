@@ -30,7 +30,10 @@ def _report(name="Small"):
 
 
 def _right(rig, path, seed=5):
-    """Check that random controls give the pose of the new file, and that no driver is broken."""
+    """Check that random sliders give the pose of the new file, and that no driver is broken.
+
+    The sliders of the gaze keep their values.
+    """
     bone = scene.face(rig)
     random = np.random.default_rng(seed)
     labels = [k for k in bone.keys() if k.startswith(PREFIX)]  # noqa: SIM118
@@ -135,7 +138,7 @@ def test_actions_nla_and_drivers_move_the_new_face(mode, dna_file, other_file):
 
 
 def _decorate(rig):
-    """Add everything that a user may add to a character. Returns the head."""
+    """Add many kinds of data that a user may add to a character. Returns the head."""
     head = scene.meshes(rig)[0]
     head.modifiers.new("Subdivision", "SUBSURF").levels = 0
     head.modifiers.new("First", "SMOOTH").factor = 0.0

@@ -10,7 +10,7 @@ from support import scene
 from support.animation import animate
 
 FRAMES = (1, 4, 7)
-ORDERS = ((7, None), (4, None), (1, None), (7, 1), (1, 4), (4, 10))  # frame, the one before it
+ORDERS = ((7, None), (4, None), (1, None), (7, 1), (1, 4), (4, 10))  # frame, frame shown before
 SIZE = 48
 NOISELESS = 1.01 / 255
 

@@ -130,7 +130,7 @@ def test_roots_stand_between_the_cards_too(haired):
     assert np.ptp(roots @ along / (along @ along)) > 0.3
 
 
-_DARK = 0.1  # a stored value, as in textures of brows
+_DARK = 0.1  # stored red, green and blue, as in textures of brows
 
 
 def test_strands_of_brows_are_no_black_wires(tmp_path):

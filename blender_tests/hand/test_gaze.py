@@ -103,7 +103,7 @@ def target_point(rig):
 
 
 def move_target(rig, x, y, z):
-    """Move the target along the world's axes by shares of its distance from the eyes."""
+    """Move the target along the control armature's axes by shares of its distance from the eyes."""
     bone = target(rig)
     rest = bone.bone.matrix_local.to_3x3()
     far = abs(bone.bone.head_local.y - scene.controls(rig).data.bones["eye_L"].head_local.y)

@@ -97,7 +97,8 @@ def _asset(rig, operator):
     return operator("EXEC_DEFAULT", **place)
 
 
-# Operator that moves controls -> (call, resulting slider values).
+# Operator that moves controls -> (call, {slider: value after the pose of `_start` and the call}).
+# None stands for any value.
 HANDS = {
     "risorius.reset": (lambda rig: bpy.ops.risorius.reset(), {LEFT: 0.0, RIGHT: 0.0, JAW: 0.0}),
     "risorius.mirror": (lambda rig: bpy.ops.risorius.mirror(), {LEFT: 0.1, RIGHT: 0.8}),
@@ -351,7 +352,10 @@ def test_to_the_next_key_of_a_control_and_of_all(rig):
 
 
 def _two_poses(rig):
-    """Poses at frames 10 and 20 of an opening mouth and a rotating head; frame 14 is shown."""
+    """Key two sliders and the head at frames 10 and 20, and show frame 14. Returns the head's bone.
+
+    A third slider, browDownL, is set without keys.
+    """
     key(rig, JAW, f10=0.2, f20=0.8)
     key(rig, LEFT, f10=0.6, f20=0.0)
     head = scene.controls(rig).pose.bones["head"]

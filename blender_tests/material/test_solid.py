@@ -8,7 +8,7 @@ from support import child, looks, scene
 from support.faces import _mesh as fine_mesh
 from support.faces import small_face
 
-SKIN = (0.8, 0.5, 0.2)  # stored value of the colour texture
+SKIN = (0.8, 0.5, 0.2)  # red, green and blue stored in the head's colour texture
 HAIR, THIN = (0.5, 0.4, 0.4), 0.15  # colour of brows, and the share of their cards that hair covers
 
 

@@ -12,11 +12,12 @@ from support.faces import neck_face, small_face
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = ROOT / "tests" / "data" / "golden"
-STAND_IN = "RISORIUS_TEST_STAND_IN"  # a file of tests/fullscale/generate.py
+STAND_IN = "RISORIUS_TEST_STAND_IN"  # variable: path of a file of tests/fullscale/generate.py
 MAN = ROOT / "build" / "sample" / "man.dna"
 NORMALS_NEAR = 2e-3  # tolerance of unit normals, which are computed from float positions
 
-# name -> (DNA or file, LODs, number of poses, scale of the object).
+# CASES: name -> (function that makes a Dna, or file; LODs; number of poses; scale of the object).
+# _CONVENTIONS: name of a case -> options of small_face.
 _CONVENTIONS = {
     "small": {},
     "z up": {"axes": ("right", "front", "up")},

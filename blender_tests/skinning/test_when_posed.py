@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones are posed only while something needs them; meshes stay in Direct mode meanwhile."""
+"""Bones are posed only while something needs them; meanwhile meshes stay in Direct mode.
+
+In pose mode the face is in Live mode.
+"""
 
 import bpy
 import pytest

@@ -5,7 +5,7 @@ from . import scene
 
 
 def animate(rig, with_head=True):
-    """Set keyframes of three controls and the head bone at frames 1, 5 and 10.
+    """Set keyframes of three controls and, if `with_head`, the head bone at frames 1, 5 and 10.
 
     Returns the control armature.
     """

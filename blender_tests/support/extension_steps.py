@@ -22,7 +22,11 @@ MODULE = "bl_ext.user_default.risorius"
 
 
 def of_ours():
-    """The add-on's handlers, classes, operators, properties and menus that this process has."""
+    """The add-on's parts that are registered in this process.
+
+    Names of its preferences, handlers, classes, operators and properties, and the number of its
+    entries in the menus Import and Add.
+    """
     handlers = [
         name
         for name in dir(bpy.app.handlers)

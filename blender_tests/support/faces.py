@@ -21,7 +21,7 @@ JOINTS = ("spine_04", "neck_01", "head", "FACIAL_C_Jaw", "FACIAL_L_Eye", "user_j
 PARENTS = (0, 0, 1, 2, 2, 2, 5)
 CHANNELS = 6
 HEAD, JAW, EYE = 2, 3, 4
-UNOWNED = 5
+UNOWNED = 5  # a joint that no joint group moves
 
 
 def _grid(columns, rows, radius, center):

@@ -146,7 +146,10 @@ def routes_of(name):
 
 
 def show(mode):
-    """Show all faces except overrides in Direct mode ("AUTO") or with posed bones ("LIVE")."""
+    """Show faces in Direct mode ("AUTO") or with posed bones ("LIVE").
+
+    Linked faces and overrides are not changed.
+    """
     for rig in rigs():
         if rig.library is None and rig.override_library is None:
             rig["risorius_skinning"] = mode
@@ -189,7 +192,8 @@ def film(frames=FRAMES, read=None):
 
     Args:
         frames: frames to play, in this order.
-        read: reader of a face's values in a depsgraph; None: bones, keys, channels and maps.
+        read: reader of a face's values in a depsgraph; None: the reader `_read`, of bones, shape
+            keys, channels, maps and the world matrix.
     """
     found = {}
     for frame in frames:
@@ -203,7 +207,7 @@ def film(frames=FRAMES, read=None):
 
 
 def _read(rig, depsgraph):
-    """Evaluated values of a face's bones, shape keys, channels and maps."""
+    """Evaluated bones, shape keys, maps and world matrix of a face, and its original channels."""
     seen = rig.evaluated_get(depsgraph)
     bones = seen.pose.bones
     found = {

@@ -44,7 +44,7 @@ def plain_head(name="Egg"):
 
 
 class Package:
-    """Replaces the functions of scene/anyhead/finding.py that find landmarks with risorius.
+    """Replaces the functions of scene/anyhead/finding.py that call risorius to find landmarks.
 
     Attributes:
         places: name -> landmark that the fake search finds, in centimetres with y up.

@@ -14,7 +14,9 @@ class Probe(bpy.types.RenderEngine):
     bl_label = "Probe"
     bl_use_preview = False
 
-    seen = {}  # frame -> {mesh index: float64[V, 3] in world space}
+    # frame -> {mesh index: float64[V, 3] in world space}. With `between`, the frame is recorded
+    # again at the end, as frame + 1e-9.
+    seen = {}
     between = ()  # offsets from the frame, in frames, at which the engine also records
 
     def render(self, depsgraph):

@@ -7,9 +7,10 @@ process.
 
     meshes       name -> points [V][3] at rest, material, colors [V][4] if it has a texture
     names        names of all other elements: armatures, bones, shape keys, takes
-    opaque       material -> whether it is opaque
-    begin, end   range of the animation in seconds
-    up, metres   up axis, and metres per unit
+    opaque       material -> whether it is opaque; empty for Alembic
+    begin, end   range of the animation in seconds; FBX: from 0
+    up, metres   up axis, and metres per unit; read from USD files only, otherwise the convention
+                 of the format
 """
 
 import base64

@@ -137,7 +137,10 @@ def counts():
 
 
 def invalid_drivers():
-    """(object name, data path) of invalid drivers in the .blend, and the number of all drivers."""
+    """(owner's name, data path) of each invalid driver in the .blend, and the number of drivers.
+
+    Owners are objects, shape keys and node trees of materials.
+    """
     owners = [
         *bpy.data.objects,
         *bpy.data.shape_keys,

@@ -425,11 +425,14 @@ class World:
     def check(self):
         """Compare all faces of the scene with the oracle, and check all drivers.
 
+        An override that Blender has locked is first repaired by the panel's operator.
+
         Returns:
             The largest error, relative to the mesh's size.
 
         Raises:
-            WrongFaceError: a driver is invalid, or a face differs by more than TOLERANCE.
+            WrongFaceError: a driver is invalid, no face is left, or a face differs by TOLERANCE or
+                more.
         """
         bad, _ = scene.invalid_drivers()
         if bad:

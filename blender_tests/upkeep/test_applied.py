@@ -9,7 +9,7 @@ from support.faces import other_face, small_face
 from support.layout import drawn
 
 NEAR = 1e-5  # tolerance as a share of the face's size
-ROLL = 3e-4  # the same for bones, whose roll angle is rounded at each step
+ROLL = 3e-4  # the same for bones, whose roll is rounded at each step; for empties, in metres
 
 APPLY = bpy.ops.object.transform_apply
 ORIGIN = bpy.ops.object.origin_set

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Reads big-endian numbers from a source of bytes, and checks before each read that the bytes are
+// there. A file is read through a window: a buffer of 64 KiB with the loaded bytes. The position is
+// the offset of the next byte to read.
 #include "bytes/byte_reader.h"
 
 #include <algorithm>
@@ -88,9 +91,11 @@ bool ByteReader::check_left(std::uint64_t bytes) {
 
 bool ByteReader::need(std::size_t n) { return check_left(n) && refill(n, n); }
 
-// Reads the file into the window, so that it begins at the position and has at least n bytes, and
-// more of the `wanted` bytes that will be read soon, if it has room. Out: false, with an error, if
-// the file ends before. In: n  a few bytes; wanted  n to left()
+// Reads the file into the window, so that the window begins at the position and has at least n
+// bytes, and more of the `wanted` bytes that will be read soon, if it has room.
+// In:  n       a few bytes
+//      wanted  number of bytes, n to left()
+// Out: false, with an error, if the file ends before
 bool ByteReader::refill(std::size_t n, std::uint64_t wanted) {
   if (window_.size() == 0) window_.resize(kWindowBytes);
   const auto rest = static_cast<std::size_t>(loaded_ - at_);  // a few bytes of an incomplete number

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Copies a whole file into memory or maps its pages, and tells whether only the user of this
+// process can write the file.
 #include "bytes/file_read.h"
 
 #include <cerrno>

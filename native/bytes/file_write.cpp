@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Writes a new file under a hidden name in the folder of its target, flushes it to disk and renames
+// it to the target, so that the target is complete at any time. The hidden name contains the
+// machine and the process that made the file, so that leftovers of ended processes can be removed.
 #include "bytes/file_write.h"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Converts paths to text for messages.
 #pragma once
 
 #include <filesystem>

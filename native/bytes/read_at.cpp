@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reads an open file at any offset with the system call pread, on systems that have it.
 #include "bytes/read_at.h"
 
 #ifndef _WIN32

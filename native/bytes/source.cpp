@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reads from a source of bytes in memory.
 #include "bytes/source.h"
 
 #include <algorithm>

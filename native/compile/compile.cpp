@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Compiles a Dna (a face in the form of its file) to a Rig (the form for evaluation): runs the
+// steps that fill the arrays of the Rig, within a budget of memory and steps, and copies the arrays
+// into one block of bytes.
 #include "compile/compile.h"
 
 #include <span>

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Compiles the joint groups, the matrices from controls (columns) to joint attributes (rows). The
+// file stores them by rows, the Rig stores the columns with a value other than 0, sorted by
+// control. Joint attributes are divided into blocks of 16, which take their values from rows.
 #include <algorithm>
 #include <cmath>
 #include <functional>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Compiles the blend shape targets of one mesh to a Morph: for each channel, the displacements
+// (deltas) of all its targets, sorted by vertex.
 #include <algorithm>
 #include <span>
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Compiles the graph of networks, and the joints that networks move. From: dna-format 12.3, 12.5
+// Compiles the graph of networks, and the joints that networks move. The nodes are operations: a
+// gather reads controls, a network computes values, a weighted sum adds values, a scatter writes
+// controls. From: dna-format 12.3, 12.5
 #include <algorithm>
 #include <array>
 #include <bit>

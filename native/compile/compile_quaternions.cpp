@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Joints that the file's joint metadata declares quaternions. From: dna-format 12.5
+// Compiles the rotations of quaternion joints, which the file's joint metadata declares
+// quaternions: each column of a joint group that rotates such a joint becomes a quaternion, a term
+// of its product. Also lists the joints that Euler angles rotate. From: dna-format 12.5
 #include <algorithm>
 #include <array>
 #include <functional>

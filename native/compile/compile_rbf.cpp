@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compiles radial solvers: converted targets, radii and inverse matrices. From: dna-format 12.4
+// Compiles radial solvers, which weight their poses by the distances of the input controls from the
+// targets of the poses: converted targets, radii and inverse matrices. From: dna-format 12.4
 #include <algorithm>
 #include <cmath>
 #include <utility>

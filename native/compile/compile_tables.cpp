@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: MIT
+// Compiles names, the neutral pose, initial values of controls, correctives (psds), blend shape
+// channels, and the conditional tables of GUI controls and animated maps. A row of a table adds
+// slope * input + cut to its output while the input is between its bounds; neighbouring rows with
+// the same input and output form a run.
 #include <algorithm>
 #include <array>
 #include <bit>

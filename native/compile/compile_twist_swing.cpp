@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Twist and swing setups. From: dna-format 12.5
+// Compiles twist and swing setups: four controls are a rotation, whose twist about an axis or swing
+// of that axis is distributed over joints. From: dna-format 12.5
 #include <algorithm>
 #include <cstdint>
 #include <set>

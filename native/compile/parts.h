@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The parts of compile(). Private to native/compile.
+// The parts of compile(), which turns a Dna (a face in the form of its file) into a Rig (the form
+// for evaluation). Private to native/compile.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The order of evaluation: chooses the watched correctives, and lists the steps of each LOD.
+// The order of evaluation: chooses the watched correctives, and lists the steps of each LOD. Steps
+// are network operations, solvers and correctives. A watched corrective is evaluated only while one
+// of its factors, its watcher, is not 0.
 #include <algorithm>
 #include <functional>
 #include <iterator>

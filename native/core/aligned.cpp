@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Allocates memory that begins on a cache line; large blocks get large pages of the system.
 #include "core/aligned.h"
 
 #include <cstring>

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Computes the hash XXH64 with the library xxHash.
 #include "core/hash.h"
 
 #define XXH_INLINE_ALL  // no library to link, and no symbols that could clash with another copy

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Divides a loop into ranges that several threads compute.
 #pragma once
 
 #include <algorithm>

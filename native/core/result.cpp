@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// The names of the error codes, and an error as one sentence.
 #include "core/result.h"
 
 namespace risorius::core {

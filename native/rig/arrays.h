@@ -64,17 +64,18 @@ struct Watch {
 ///
 /// The matrix is stored column by column, a column for each control, in joint_values or
 /// joint_halves. The columns of one control in all groups are stored one after the other, so that a
-/// control is one run of memory. Columns of kWidest rows and more begin on whole vectors; others
-/// have no padding.
+/// control is one run of memory. Columns of at least kWidest (16) rows begin at a multiple of
+/// kWidest values; shorter columns have no padding.
 struct JointGroup {
   std::uint32_t row_count = 0;
   std::uint32_t column_count = 0;  // columns that hold at least one value other than 0
-  // The first row of this group among the rows of all groups. A group of kWidest rows or more takes
-  // whole vectors of rows, so that the rest of its last vector is unused. Smaller groups have no
-  // padding.
+  // The first row of this group among the rows of all groups. A group of at least kWidest (16) rows
+  // begins and ends at a multiple of kWidest rows, so that rows after its last row are unused.
+  // Smaller groups have no padding.
   std::uint32_t rows_begin = 0;
   std::uint32_t columns_begin = 0;  // its first column in group_columns
-  // The blocks of joint attributes that this group's rows write at any LOD: see joint_pieces.
+  // The range of blocks (16 consecutive joint attributes, see joint_pieces) that the rows of this
+  // group write at any LOD: from blocks_begin up to, not including, blocks_end.
   std::uint32_t blocks_begin = 0, blocks_end = 0;
 };
 
@@ -156,8 +157,9 @@ struct MlOperation {
   // adds values of other operations; kScatter copies values to controls.
   enum Kind : std::uint32_t { kGather = 1, kScatter = 2, kMlp = 3, kWeightedSum = 4 };
   std::uint32_t kind = kGather;
-  // The region whose mask switches the operation off. For kMlp it is the region of its network, for
-  // kScatter the region of the network whose values it writes. kNone: no mask.
+  // The region whose mask switches the operation off while the mask is 0, an index into the masks
+  // of a Workspace. For kMlp it is the region of its network, for kScatter the region of the
+  // network whose values it writes. kNone: no mask.
   std::uint32_t mask = kNone;
   std::uint32_t values_begin = 0, value_count = 0;      // its results, in operation_values
   std::uint32_t segments_begin = 0, segment_count = 0;  // its inputs, in ml_segments

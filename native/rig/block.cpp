@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Makes, opens and checks a Rig (a compiled face) as one block of bytes: a header, then the arrays
+// of the Rig, each at a multiple of 64 bytes. The header states the sizes, the place of each array
+// and a hash of the bytes.
 #include "rig/block.h"
 
 #include <algorithm>

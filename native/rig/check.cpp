@@ -133,8 +133,9 @@ void check_groups(const Rig& r, IndexCheck& c) {
   std::uint64_t rows = 0, begin = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const JointGroup& g = r.joint_groups[i];
-    // Rows of groups follow each other without gaps: a kernel writes whole registers, so that it
-    // also overwrites rows of the next group. Only wide groups begin on a vector of their own.
+    // Small groups follow each other without gaps, although a kernel writes whole registers and so
+    // also overwrites the first rows of the next group, which is computed later. Groups of at least
+    // kWidest rows begin at a multiple of kWidest rows.
     const bool wide = g.row_count >= simd::kWidest;
     if (wide) rows = simd::rounded_up(rows);
     c.demand("joint_groups",

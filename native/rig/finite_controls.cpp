@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Finds raw controls that are NaN or infinite, and reports the first one in an error.
 #include "rig/finite_controls.h"
 
 #include <algorithm>

@@ -20,14 +20,14 @@ struct NonFinite {
 
 /// The raw controls that are NaN or infinite, sorted by frame and then by control. The comment of
 /// evaluate() lists the outputs that become invalid.
-/// In:   raw   float32[count, R], the raw controls of each frame
+/// In:   raw   float32[count, raw controls], for each of `count` frames
 ///       most  the largest number of results
 /// Cost: one pass over raw; allocates only if something is found.
 std::vector<NonFinite> find_non_finite(const Rig& rig, const float* raw, std::size_t count,
                                        std::size_t most = SIZE_MAX);
 
 /// Checks that all raw controls are finite.
-/// In:    raw  float32[count, R], the raw controls of each frame
+/// In:    raw  float32[count, raw controls], for each of `count` frames
 /// Fails: kInvalidValue; the error names the first control that is not finite, its frame if there
 ///        are several, its value, and the number of further such values if there are any
 core::Status check_finite(const Rig& rig, const float* raw, std::size_t count);

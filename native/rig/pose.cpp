@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Makes poses and workspaces (the scratch memory of evaluations) of the sizes that a Rig needs.
 #include "rig/pose.h"
 
 namespace risorius::rig {
@@ -19,7 +20,7 @@ std::vector<simd::Rows> rows_of_groups(const Rig& rig) {
   return all;
 }
 
-// If rotations in poses are quaternions: the joints that no Euler angles rotate.
+// The joints that no Euler angles rotate, if rotations in poses are quaternions; otherwise none.
 std::vector<std::uint16_t> straight_joints(const Rig& rig) {
   if (rig.joint_stride != 10) return {};
   std::vector<bool> turns(rig.joint_count);

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Pose: the result of an evaluation. Workspace: its scratch memory.
+// Pose: the result of an evaluation. Workspace: its scratch memory, which also keeps lists of the
+// frame before. A control is active if it is not 0; its columns are its coefficients in the joint
+// groups.
 #pragma once
 
 #include <algorithm>
@@ -79,21 +81,23 @@ struct alignas(128) Workspace {
   bool warm = false;
   // Correctives.
   KeptControls firing_for;              // the active controls for which firing holds
-  std::vector<std::uint16_t> firing;    // watched correctives that may not be 0, as indices into
-  std::size_t firing_count = 0;         // psds; the first firing_count entries are valid
+  std::vector<std::uint16_t> firing;    // watched correctives that can differ from 0, as indices
+  std::size_t firing_count = 0;         // into psds; the first firing_count entries are valid
   bool fires_all = false;               // true: no factor of the listed correctives is 0
   std::vector<std::uint64_t> psd_bits;  // a bit for each corrective control that is not 0
-  // [controls]: in a latent evaluation the controls before the correctives ran.
+  // [controls]: the values of the controls in a latent evaluation before its correctives run. In a
+  // latent evaluation, each stage reads the results of later stages from the frame before.
   std::vector<float> last_controls;
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
-  KeptControls listed_for;  // the active controls for which moves and blocks hold
-  // The traversal of the frame in which moves and blocks were computed; after kAdded, columns and
-  // ends are not valid.
+  KeptControls listed_for;  // the active controls for which moves and live_blocks hold
+  // The traversal of the frame in which moves, live_blocks and live were computed; after kAdded,
+  // columns and column_ends are not valid.
   Traversal listed = Traversal::kListed;
   std::size_t whole_frames = 0;  // evaluations that read all columns
   std::size_t added_frames = 0;  // evaluations that added columns in the order of memory
-  // [groups]: where the columns of the group end in columns, or in group_columns after kWhole.
+  // [groups]: where the columns of the group end in `columns`, or in Rig::group_columns after
+  // kWhole.
   std::vector<std::uint32_t> column_ends;
   std::vector<std::uint8_t> moves;         // [groups]: 1 if a group has active columns
   std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
@@ -111,7 +115,8 @@ struct alignas(128) Workspace {
   // If poses have quaternions: the joints that no Euler angles turn at any LOD.
   std::vector<std::uint16_t> straight_joints;
   std::vector<Quaternion> products;  // [quaternion joints]
-  // A bit for each of quaternion_columns whose control is not 0; all are 0 between calls.
+  // A bit for each column of Rig::quaternion_columns: 1 if the column's control is not 0. All bits
+  // are 0 between two evaluations.
   std::vector<std::uint64_t> quaternion_bits;
   // Solvers and networks.
   // The inputs of a solver, then the kernel values of its poses, then the weights of its poses.

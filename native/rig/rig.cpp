@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Reads the names that a Rig stores.
 #include "rig/rig.h"
 
 namespace risorius::rig {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Saves a Rig (a compiled face) to a file, and opens it with the check that the trust in the file's
+// writer demands.
 #include "rig/rig_file.h"
 
 #include "bytes/file_write.h"

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Asks the CPU with its instruction cpuid which instruction sets it has, and whether the operating
+// system saves their registers. A leaf is an answer of cpuid: four words with a bit for each
+// feature.
 #include "simd/kernels.h"
 
 #if defined(__x86_64__) || defined(__i386__) || defined(_M_X64) || defined(_M_IX86)

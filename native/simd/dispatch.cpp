@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Chooses a table of kernels, the inner loops for one instruction set: by name, by the environment
+// variable RISORIUS_SIMD, or the best table that the CPU supports.
 #include <array>
 #include <cstdlib>
 #include <string>

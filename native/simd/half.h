@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// IEEE 754 half floats in plain code.
+// Converts between float32 and IEEE 754 half floats (16 bits) in plain code.
 #pragma once
 
 #include <bit>

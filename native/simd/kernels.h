@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The inner loops of the evaluator and of the file reader: one table of functions per instruction
-// set.
+// Kernels: the inner loops of the evaluator and of the file reader, one table of functions per
+// instruction set. A vector is a CPU register of several floats; a batch is several frames that are
+// evaluated together.
 #pragma once
 
 #include <cstddef>

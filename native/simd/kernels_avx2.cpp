@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// The kernels for AVX2 with FMA and F16C: instructions for the loops of kernels_body.h and
+// skin_body.h, on registers of eight floats, one in each lane. A piece copies consecutive values to
+// the places of a block of 16 places whose bit is set in the mask of the piece.
 #include <array>
 #include <bit>
 

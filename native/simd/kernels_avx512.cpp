@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// The kernels for AVX-512: instructions for the loops of kernels_body.h, rotations_body.h and
+// skin_body.h, on registers of 16 floats, one in each lane. A piece copies consecutive values to
+// the places of a block of 16 places whose bit is set in the mask of the piece.
 #include "simd/kernels.h"
 
 #if defined(__x86_64__) || defined(_M_X64)
@@ -17,9 +20,10 @@ namespace risorius::simd {
 
 namespace {
 
-// Like OneByOne of rotations_body.h, but copies sixteen rotations together, four in a register. The
-// function for the sines then loads exactly these registers; loads that span two stores of half a
-// register would have to wait for both. split also reads the float after the three angles, where
+// Copies Euler angles from memory to an array for each axis (split) and quaternion components back
+// (join), like OneByOne of rotations_body.h, but sixteen rotations together, four in a register.
+// The function for the sines then loads exactly these registers; loads that span two stores of half
+// a register would have to wait for both. split also reads the float after the three angles, where
 // join writes w.
 struct SixteenByFour {
   static_assert(kTurns == 16);

@@ -155,8 +155,8 @@ RISORIUS_INLINE auto order_of(std::uint32_t mask) {
   }
 }
 
-// Places the pieces in all frames. Each mask is decoded only once. kMore: the pieces are those of
-// place_more; kMany: there are several frames.
+// Places the pieces in all frames. Each mask is decoded only once. kMore: true as place_more, false
+// as place of kernels.h; kMany: there are several frames.
 template <bool kMore, bool kMany>
 RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames frames) {
   for (std::size_t i = 0; i < n; ++i) {

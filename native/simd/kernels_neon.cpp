@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// The kernels for ARM NEON: instructions for the loops of kernels_body.h and skin_body.h, on
+// registers of four floats.
 #include <bit>
 
 #include "simd/kernels.h"

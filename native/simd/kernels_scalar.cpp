@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// The kernels in plain C++, with a fixed order of operations, so that the bits are the same on
+// every machine.
 #include "simd/half.h"
 #include "simd/kernels.h"
 

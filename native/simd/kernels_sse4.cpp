@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// The kernels for SSE4.1: instructions for the loops of kernels_body.h, rotations_body.h and
+// skin_body.h, on registers of four floats, one in each lane. The results have the same bits as the
+// results of the scalar kernels.
 #include <bit>
 
 #include "simd/kernels.h"
@@ -19,8 +22,9 @@ namespace risorius::simd {
 
 namespace {
 
-// Like OneByOne of rotations_body.h, but copies four rotations together. split also reads the float
-// after the three angles, where join writes w.
+// Copies Euler angles from memory to an array for each axis (split) and quaternion components back
+// (join), like OneByOne of rotations_body.h, but four rotations together. split also reads the
+// float after the three angles, where join writes w.
 struct FourByFour {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
                                     Turns (&angles)[3]) {

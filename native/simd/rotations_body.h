@@ -153,7 +153,7 @@ RISORIUS_INLINE bool turns(const float* angles) {
   return (two | third) != 0;
 }
 
-// Lists the rotations that are not 0 in `turning`, and writes quaternions of no rotation for the
+// Lists in `turning` the rotations that are not 0, and writes quaternions of no rotation for the
 // others. A batch of sixteen is computed only when 32 more have been listed, because the CPU would
 // otherwise have to wait for the entries of the list that it has just written.
 template <class Parts>

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Least squares with bounds on the unknowns: least_change() solves the dual problem, which has one
+// unknown for each row, and descend() minimises a quadratic function by coordinate descent with
+// Newton steps.
 #include "solve/bounded.h"
 
 #include <algorithm>
@@ -47,7 +50,8 @@ struct Dual {
   const double *a, *b, *low, *high;
   double ridge;
 
-  /// Out: x  the solution that belongs to y; slope  y + a x - b, the gradient of value()
+  /// Computes x(y) = clip(a^T y / ridge, low, high).
+  /// Out: x  x(y); slope  y + a x - b, the gradient of value()
   void image(const std::vector<double>& y, double* x, std::vector<double>& slope) const {
     std::fill(x, x + columns, 0.0);
     for (std::size_t r = 0; r < rows; ++r) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Least squares with bounds.
+// Least squares with bounds on the unknowns, such as raw controls that bring points of a skin to
+// goals.
 #pragma once
 
 #include <cstddef>

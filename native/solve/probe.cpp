@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Computes positions of points of a skin, and their derivatives by raw controls as difference
+// quotients: each control is moved a little from a base pose, and only the points that this moves
+// are skinned again.
 #include "solve/probe.h"
 
 #include <algorithm>

@@ -46,14 +46,14 @@ class Probe {
 
   std::size_t size() const { return points_.size(); }
   /// Computes the positions of the points in a pose.
-  /// In:  raw  float32[R], the raw controls of the pose
+  /// In:  raw  float32[raw controls], the pose
   /// Out: out  float64[points, 3], file units
   void positions(const float* raw, double* out);
   /// Computes the derivatives of the positions.
-  /// In: raw   float32[R], the pose
-  ///     high  float32[R]: a control that a step up would move above this value is moved down
-  ///           instead
-  ///     free  [R]: a control whose value here is 0 gets no column
+  /// In: raw   float32[raw controls], the pose
+  ///     high  float32[raw controls]: a control that a step up would move above this value is moved
+  ///           down instead
+  ///     free  [raw controls]: a control whose value here is 0 gets no column
   Jacobian jacobian(const float* raw, const float* high, const std::uint8_t* free);
 
  private:

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Copies the hierarchy of a face's joints and, for each mesh, the influences and blend shapes of
+// its vertices, and computes the matrices of joints.
 #include "solve/surface.h"
 
 #include <cmath>

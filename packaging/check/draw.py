@@ -187,7 +187,9 @@ def page_sentences(path: Path) -> Iterator[Item]:
             continue
         if whole.startswith("#"):
             headings, lead = [*headings[:1], whole.lstrip("# ")], ""
-        elif "|" not in paragraph:
+        elif "|" in paragraph:
+            lead = ""
+        else:
             lead = lead if is_item else whole
             context = f"{lead} {whole}" if is_item and lead.endswith(":") else whole
             if whole.endswith(":"):

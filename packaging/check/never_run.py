@@ -130,7 +130,7 @@ def part_of(name: str) -> str:
 
 
 def told(files: list[File]) -> str:
-    """The list of lines that never ran, as text."""
+    """The list of lines that never ran, as text, and a sum for each part of the project."""
     out, lines, missing = [], Counter[str](), Counter[str]()
     for file in sorted(files, key=lambda f: f.name):
         lines[part_of(file.name)] += file.lines

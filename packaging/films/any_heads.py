@@ -45,7 +45,7 @@ WORN = replace(
 
 
 def meshes_of(person: Person, source: Source) -> dict[str, tuple[Doubles, Faces]]:
-    """The meshes of a person in the neutral pose: mesh name -> (positions in cm, polygons).
+    """The meshes of LOD 0 of a person in the neutral pose: name -> (positions in cm, polygons).
 
     Args:
         person: a person of PEOPLE or a changed copy.

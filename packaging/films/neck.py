@@ -27,7 +27,8 @@ from compare import sheet  # noqa: E402
 from mathutils import Matrix, Vector  # noqa: E402
 
 SHOWN = ("left", "right", "up", "down", "tilt left")
-PLACE, TARGET, LENS = Vector((0.42, -0.85, 0.02)), Vector((0.0, 0.03, -0.115)), 100  # from the eyes
+# Place and target of the camera in metres from the point between the eyes, and focal length in mm.
+PLACE, TARGET, LENS = Vector((0.42, -0.85, 0.02)), Vector((0.0, 0.03, -0.115)), 100
 
 
 def parse():

@@ -115,7 +115,8 @@ def add_flash(target, unit):
 
 
 def stand_side_by_side(man, woman):
-    """Move the control armatures beside each other, and raise the woman to the man's height."""
+    """Move the control armatures beside each other, and the top of the woman to 1 cm below the
+    man's top."""
     man.location.x, woman.location.x = -APART / 2, APART / 2
     tops = [stage.bounds(c.users_collection[0])[1].z for c in (man, woman)]
     woman.location.z += tops[0] - tops[1] - 0.01
@@ -123,7 +124,8 @@ def stand_side_by_side(man, woman):
 
 
 def build_stage(man, woman):
-    """Add the man's studio, move it to the middle between both people, and move the camera back."""
+    """Add the man's studio, move it to the middle between both people, move the camera back, and
+    add the flash."""
     collection = man.users_collection[0]
     choose(woman)
     must(bpy.ops.risorius.set_strands())

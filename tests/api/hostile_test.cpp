@@ -13,8 +13,8 @@ using namespace testing_support;
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Expects that the bytes are either opened and evaluated at every LOD, or rejected with a message
-// and a place in the file.
+// Expects that the bytes are either opened and evaluated at every LOD, or rejected as a bad or too
+// large file, with a message and an offset that is not after the last byte.
 void expect_sound(const Bytes& bytes) {
   risorius_options options{};
   options.flags = RISORIUS_GEOMETRY | RISORIUS_TARGETS;

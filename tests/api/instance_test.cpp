@@ -122,7 +122,8 @@ TEST(ApiInstance, GuiControlsMoveTheRawControlsOfTheirTableAndNoOther) {
   const std::vector<float> before = wave(rig.raw_count, 1), gui = wave(rig.gui_count, 2);
   ASSERT_GT(gui.size(), 1u);
   set_raw(instance, before);
-  // GUI controls are set one by one. Each call computes the raw controls from all of them.
+  // GUI controls are set one by one. Each call computes the raw controls
+  // from all GUI controls.
   for (std::uint32_t i = 0; i < gui.size(); ++i) {
     ASSERT_EQ(risorius_set(instance.get(), RISORIUS_GUI_CONTROLS, i, 1, &gui[i]), RISORIUS_OK);
   }
@@ -163,7 +164,8 @@ TEST(ApiInstance, TwoThreadsWithOneEachDoNotMeet) {
                 RISORIUS_OK);
       EXPECT_EQ(risorius_evaluate(instance.get()), RISORIUS_OK);
       out.push_back(values(instance, RISORIUS_JOINTS));
-      // The last error is stored per thread, so that each thread finds its own number in it.
+      // The last error is stored per thread, so that each thread finds in it the LOD that it asked
+      // for itself.
       EXPECT_EQ(risorius_set_lod(instance.get(), static_cast<std::uint32_t>(1000 + first)),
                 RISORIUS_BAD_ARGUMENT);
       EXPECT_NE(std::string(risorius_last_error()->message).find(std::to_string(1000 + first)),

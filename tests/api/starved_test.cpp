@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// If memory runs out, the C API reports it; nothing is thrown or lost.
+// If memory runs out, the C API reports it and throws nothing; a later call with enough memory
+// succeeds.
 #include <atomic>
 #include <cstdlib>
 #include <new>
@@ -8,7 +9,7 @@
 
 namespace {
 
-std::atomic<long> left{-1};  // number of calls of new that succeed; -1: all
+std::atomic<long> left{-1};  // calls of new that still succeed; -1: all
 
 void* given(std::size_t bytes) noexcept {
   if (left == 0) return nullptr;

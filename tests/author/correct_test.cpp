@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A flat sheet over a ball; formulas give the depth of each vertex in the ball.
+// Finds and repairs faults of a flat sheet of skin above a ball; formulas give the depth of each
+// vertex in the ball.
 #include "author/correct.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +19,7 @@ constexpr double kRadius = 6.0;       // mm, of a ball whose top lies 1 mm below
 double x_of(std::uint32_t v) { return double(v % kSheet) - 20.0; }
 double y_of(std::uint32_t v) { return double(v / kSheet) - 20.0; }
 
-/// A sphere of rings of vertices, with triangles that face outwards.
+/// Appends the vertices of a ball, ring after ring, to `positions`; its triangles face outwards.
 Skin::Solid sphere(std::vector<Vector3>& positions) {
   constexpr std::uint32_t kRings = 60, kAround = 60;
   Skin::Solid out;
@@ -153,7 +154,8 @@ TEST(Correct, WhatTwoPartsDoTogetherIsRepairedNearTheFaultAlone) {
     const auto& x = repair->displacement[v];
     const double length = std::hypot(x[0], x[1], x[2]);
     most = std::max(most, length);
-    // All vertices deeper than kDepth in the ball are within 3.2 mm of the middle.
+    // All vertices that are deeper than kDepth in the ball are within 3.2 mm of the middle of the
+    // sheet.
     if (std::hypot(x_of(v), y_of(v)) > 3.5 + SkinChecker::kAround) {
       EXPECT_EQ(length, 0.0) << v;
     }
@@ -167,7 +169,7 @@ TEST(Correct, WhatTwoPartsDoTogetherIsRepairedNearTheFaultAlone) {
 TEST(Correct, WhatDoesMostAtAVertexStays) {
   const Scene scene;
   const SkinChecker check = checker(scene);
-  // Only the wide push moves vertices beyond 7 mm.
+  // Only the wide push moves vertices that are more than 7 mm from the middle of the sheet.
   const auto narrow = scene.pushed(0.95, 7.0), wide = scene.pushed(0.6, 14.0);
   auto both = narrow;
   for (std::size_t v = 0; v < both.size(); ++v) both[v][2] += wide[v][2];
@@ -186,6 +188,8 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
 /// Repairs a pose of the sheet of skin. The pose has a single part (such as an expression), and the
 /// skin without this part has the same positions. So taking the part back removes no fault, and
 /// only the least squares solve can help. Faults that the sheet has before the pose are allowed.
+/// Expects that only vertices near the middle move and that a measurement confirms the reported
+/// faults.
 Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, scene.pose(scene.skin.neutral));

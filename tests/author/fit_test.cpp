@@ -15,7 +15,8 @@ namespace {
 
 constexpr std::uint32_t kSide = 21;  // vertices along a side: 441 in all
 
-/// A flat sheet of 2 x 2 units around the origin, in the plane z = 0.
+/// A flat sheet of 2 x 2 units around the origin, in the plane z = 0, whose expressions move
+/// nothing.
 Shapes sheet(std::size_t expressions) {
   Shapes out;
   out.expressions = expressions;
@@ -40,7 +41,8 @@ double bump(const Vector3& p, double x, double y) {
   return d < 1.0 ? (1.0 - d) * (1.0 - d) : 0.0;
 }
 
-/// Three expressions: the left side rises, the right side rises, the left side rotates about y.
+/// Three expressions: the left side (x > 0) rises, the right side rises, the left side rotates
+/// about y.
 Shapes two_sides() {
   Shapes out = sheet(3);
   const double angle = 0.3;
@@ -55,7 +57,7 @@ Shapes two_sides() {
   return out;
 }
 
-/// The position of a vertex that the fit's joints give, by Rodrigues' formula.
+/// The position of vertex v in expression e that the fit's joints give, by Rodrigues' formula.
 Vector3 posed(const Shapes& shapes, const Fit& fit, std::size_t v, std::size_t e) {
   Vector3 out{};
   const Vector3& p = shapes.neutral[v];
@@ -178,7 +180,7 @@ TEST(Fit, BothSidesOfASymmetricMeshAreAlike) {
   }
 }
 
-/// The largest displacement of any vertex by one joint in an expression.
+/// The largest displacement of any vertex in expression e if only joint j moves.
 double effect(const Shapes& shapes, const Fit& fit, std::size_t j, std::size_t e) {
   Fit alone = fit;
   for (std::size_t other = 0; other < fit.joints.size(); ++other) {
@@ -250,8 +252,8 @@ TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
     options.bound = true;
     auto best = fit_joints(shapes, options);
     ASSERT_TRUE(last && best);
-    // The bound is not exact: the fit minimises over four expressions, because it adds the mirror
-    // of the third one.
+    // The best round may have a slightly larger error here than the last one: the fit compares
+    // rounds over four expressions, because it adds the mirror of the third one.
     EXPECT_LE(largest_error(shapes, *best), 1.1 * largest_error(shapes, *last)) << rounds;
     any = any || largest_error(shapes, *best) < 0.9 * largest_error(shapes, *last);
   }
@@ -362,8 +364,8 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
   auto again = fit_weights(shapes, joints, few(9), start);
   ASSERT_TRUE(again) << again.error().describe();
   EXPECT_LT(largest_error(shapes, *again), 1.1 * largest_error(shapes, *fit));
-  // 30 joints without motion, more than the candidates of a vertex, must not displace a moving
-  // joint.
+  // 30 joints without motion, more than the number of candidate joints of a vertex, must not take
+  // the place of a moving joint among the candidates.
   std::vector<GivenJoint> many(30);
   many.insert(many.end(), joints.begin() + 1, joints.end());
   StartWeights later = start;
@@ -385,7 +387,8 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
             core::ErrorCode::kInvalidLength);
 }
 
-/// The sheet half as wide, twice as deep and sheared, with displacements scaled alike.
+/// The sheet `shapes`, half as wide, twice as deep and sheared; its displacements are scaled in the
+/// same way but not sheared.
 Shapes reshaped(Shapes shapes) {
   for (Vector3& p : shapes.neutral) p = {0.5 * p[0], p[1], 2.0 * p[2] + 0.1 * p[1]};
   for (std::size_t i = 0; i < shapes.displacements.size(); i += 3) {

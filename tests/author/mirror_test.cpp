@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Meshes with a known mirror.
+// find_mirror pairs the vertices and expressions of both sides of a mesh, or finds that it is not
+// symmetric.
 #include "author/mirror.h"
 
 #include <gtest/gtest.h>

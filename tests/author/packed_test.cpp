@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Rows of mesh buffers survive packing by EXT_meshopt_compression, and bytes that are cut or too
+// few are errors.
 #include "author/packed.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Simplifies a flat sheet to fewer triangles. The simplified sheet has the same area, and more
+// triangles near changes of an attribute.
 #include "author/simplify.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A separate file, because it contains the commit and is recompiled after every commit.
+// The compiler and the commit of the benchmarks' build. They have a separate file, because it must
+// be recompiled after every commit.
 #include "bench/machine.h"
 
 namespace risorius::bench {

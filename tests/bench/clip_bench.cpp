@@ -4,8 +4,9 @@
 //   one frame          a frame of all controls in another block than the frame before; its whole
 //                    block is read and decoded
 //   play               frame by frame; each block is read and decoded when it is reached; per frame
-//   play, decoded      like play, but all frames are in one decoded block
-//   evaluate           evaluation of the rig of --dna with these frames, for comparison; per frame
+//   play, decoded      like play, but only the frames of the first block, which is decoded once
+//   evaluate           evaluation of the rig of --dna, for comparison, with generated frames in
+//                      which 60 controls are active; per frame
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
@@ -65,8 +66,8 @@ void decode(benchmark::State& state, const File& file) {
 
 void one_frame(benchmark::State& state, const File& file) {
   clip::Player player(open(file));
-  // Each frame is so far from the previous one that it is in another block, unless the clip has
-  // only one block.
+  // Each frame is more than the length of a block after the previous one, so that it is in another
+  // block. Where the clip begins again, a short clip may stay in the same block.
   std::size_t at = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(player.frame(at));

@@ -19,8 +19,8 @@ double wall_seconds_of(F f) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The seconds during which f ran on a core. Time that the system gave to other processes does not
-/// count.
+/// The processor time in seconds that this process takes during f, summed over its threads. Time
+/// that the system gave to other processes does not count. Without such a clock: the wall time.
 template <class F>
 double own_seconds_of(F f) {
 #ifdef CLOCK_PROCESS_CPUTIME_ID

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// The baseline of the evaluator's benchmarks: an evaluation in the shortest scalar code, with the
+// joint groups as one compressed sparse row matrix.
 #include "bench/csr.h"
 
 #include <algorithm>

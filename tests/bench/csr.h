@@ -10,7 +10,7 @@
 
 namespace risorius::bench {
 
-/// The matrix of all joint groups, one row per joint attribute.
+/// The matrix of all joint groups at one LOD, one row per joint attribute, one column per control.
 struct Csr {
   std::vector<std::uint32_t> begins;  // [rows + 1] index of each row's first value
   std::vector<std::uint16_t> columns;

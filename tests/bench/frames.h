@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames of raw controls.
+// Frames of raw controls for benchmarks, generated or read from a file.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace risorius::bench {
 struct Frames {
   std::size_t count = 0, controls = 0;
   std::vector<float> values;  // [count, controls]
-  std::string name;           // as in the table
+  std::string name;           // in the table of rig_bench
   const float* at(std::size_t frame) const { return values.data() + frame * controls; }
 };
 

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Measures how fast a processor issues the skinning kernel's instructions if memory is no limit.
+// For each influence, the row of its bone (the 16 floats of the bone's matrix) is multiplied by the
+// weight and added to a sum in registers; the sums have no use.
 #include "bench/issue.h"
 
 #include <benchmark/benchmark.h>
@@ -113,9 +116,9 @@ __attribute__((target("avx2,fma"))) float issue_256(const Data& d, std::size_t i
   return sum;
 }
 
-// Issues the kernel's reads and multiply-adds in registers of four floats, as in SSE4, where
-// multiplication and addition are separate instructions. Returns a sum, so that the compiler keeps
-// the work.
+// Issues the skinning kernel's reads and multiply-adds in registers of four floats, as in SSE4,
+// where multiplication and addition are separate instructions. Returns a sum, so that the compiler
+// keeps the work.
 float issue_128(const Data& d, std::size_t influences) {
   constexpr std::size_t kSums = 4;
   __m128 s[kSums][3];

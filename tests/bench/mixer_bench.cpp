@@ -19,7 +19,8 @@ std::vector<std::string> control_names() {
   return out;
 }
 
-// A layer whose clip moves every `step`-th region. The mask of the other controls is 0 if step > 1.
+// A layer whose clip moves every `step`-th region of eight consecutive controls. The mask of the
+// controls in the other regions is 0.
 clip::Layer make_layer(std::size_t step, clip::Blend blend, unsigned seed) {
   const std::vector<std::string> names = control_names();
   std::mt19937 random(seed);

@@ -44,7 +44,8 @@ class CountingSource final : public bytes::Source {
   std::uint64_t bytes_ = 0;
 };
 
-// The results of a benchmark. Numbers of bytes are measured in a separate run.
+// The results of a benchmark: its times, and the numbers of bytes that it reads and keeps, which
+// count_bytes measures in a separate run.
 struct Row {
   std::string name;
   std::vector<double> ms;

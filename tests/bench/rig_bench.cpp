@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Compares the evaluator with a scalar CSR matrix:
+// Compares the evaluator with one scalar CSR (compressed sparse row) matrix of all joint groups:
 //   rig_bench FILE.dna [FRAMES20.f32 FRAMES60.f32 FRAMES_ALL.f32] [--sweep] [--progress]
 //   [--clip FRAMES.f32] [options of the library]
 // Frames are little-endian float32[frames, raw controls]; without files, frames are generated.
 // --sweep instead measures how time grows with the size of the work, and prints a row for each
-// point: name, x, us, us of csr, us of the tight read.
+// point: name, x (the size), us, us of csr, us of only reading the columns of active controls.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -144,7 +144,7 @@ void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, con
 }
 
 // Adds a benchmark that only reads the columns that an evaluation of these frames needs.
-// Out: mean number of bytes per frame
+// Out: mean size of these columns per frame, in bytes
 double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
                 std::uint32_t lod) {
   auto reads = std::make_shared<bench::Reads>(bench::reads_of(*rig, frames, lod));
@@ -159,8 +159,8 @@ double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, co
   return bytes;
 }
 
-// Adds a benchmark that stores the poses of a clip with stores that bypass the caches. The result
-// is the time for one pose.
+// Adds a benchmark that stores as many bytes as `count` poses have, with stores that bypass the
+// caches. Its result is the time for one pose.
 void add_store(const std::string& name, std::shared_ptr<const rig::Rig> rig, std::size_t count) {
   auto* b = benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
     const std::size_t pose = std::size_t{rig->joint_count} * rig->joint_stride +
@@ -247,8 +247,8 @@ class Suite {
     lines_.push_back({name, base, read, asked, bytes});
     return lines_.back().name;
   }
-  // Adds benchmarks of a face, of the face as one sparse matrix (CSR; LOD 0 has it already), and of
-  // reading the active columns only.
+  // Adds benchmarks of a face, of the face as one sparse matrix (CSR; not for LOD 0, for which
+  // add_frames adds it), and of reading the active columns only.
   void add_ours(const std::string& what, const std::shared_ptr<rig::Rig>& rig, const Frames& frames,
                 std::uint32_t lod, const std::string& asked, const std::string& level = "") {
     const std::string base = "csr" + level + ", " + frames.name;
@@ -457,11 +457,12 @@ bool add_frames(const std::string& name, std::size_t raw, std::size_t active, co
 // Makes the sets of frames that the table compares.
 // In: files  three files: frames with 20, with 60 and with all controls active; nullptr: generated
 //     clip   file with the frames of a real clip, or nullptr
+// Out: out    the sets; the result is false, after a message, if a file is not valid
 bool list_frames(std::size_t raw, char** files, const char* clip, std::vector<Frames>& out) {
   // 60 and 100 are first, because in captured animations 60 to 100 raw controls move.
   for (const std::size_t active : {60u, 100u, 20u, 1u, 5u, 140u, 190u}) {
-    // Rows with at least as many active controls as the face has are left out, except 20 and 60,
-    // with which other rows are compared.
+    // Sets with at least as many active controls as the face has are left out, except 20 and 60,
+    // which files may give; other rows are compared with 60.
     if (active >= raw && active != 20 && active != 60) continue;
     const char* file = files == nullptr ? nullptr
                        : active == 20   ? files[0]

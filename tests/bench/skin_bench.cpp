@@ -26,7 +26,8 @@ struct Times {
   double median = 0, least = 0;  // us
 };
 
-// Measures the steps in turn, so that other load of the machine affects all of them alike.
+// Measures each step `rounds` times, in turn with the others, so that other load of the machine
+// affects all steps alike. Out: median and least time of each step, in us
 std::vector<Times> measure(const std::vector<std::function<void()>>& steps, std::size_t rounds) {
   std::vector<std::vector<double>> all(steps.size());
   for (std::size_t r = 0; r < rounds; ++r) {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Reads the cache lines that an evaluation must read, the columns of the active controls (controls
+// that are not 0), as fast as the CPU can.
 #include "bench/tight_read.h"
 
 #include <algorithm>
@@ -89,7 +91,8 @@ __attribute__((target("avx2"))) std::uint64_t read_256(const char* memory,
 
 #endif
 
-// Appends the cache lines that one frame needs. Adjacent runs are joined.
+// Appends the runs of cache lines that one frame needs to out.lines, with adjacent runs joined, and
+// adds the size of the columns to out.bytes.
 void append_lines(const rig::Rig& rig, const float* controls, std::uint32_t lod, Reads& out) {
   const std::size_t size = rig.is_half() ? 2 : 4, begin = out.lines.size();
   for (std::size_t c = 0; c < rig.control_count; ++c) {

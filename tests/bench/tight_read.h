@@ -12,7 +12,7 @@
 
 namespace risorius::bench {
 
-/// Consecutive cache lines, counted from the beginning of a matrix.
+/// A run of `count` consecutive cache lines, of which the first has the number `first` in a matrix.
 struct Lines {
   std::uint32_t first = 0, count = 0;
 };
@@ -30,7 +30,7 @@ void streaming_store(void* memory, std::size_t bytes);
 /// The cache lines of a Rig's matrices that the frames of one set need.
 struct Reads {
   std::vector<Lines> lines;         // of all frames
-  std::vector<std::size_t> begins;  // [frames + 1]: the first line of each frame
+  std::vector<std::size_t> begins;  // [frames + 1]: index in `lines` where a frame begins
   double bytes = 0;                 // of the active columns' values, mean of all frames
   std::span<const Lines> at(std::size_t frame) const {
     return std::span(lines).subspan(begins[frame], begins[frame + 1] - begins[frame]);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The reader takes the byte order of its table, and RISORIUS_SIMD chooses the table.
+// ByteReader converts numbers with the kernels that it is given, or else with the kernels that
+// RISORIUS_SIMD names.
 #include <gtest/gtest.h>
 
 #include <array>

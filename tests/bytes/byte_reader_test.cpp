@@ -86,8 +86,8 @@ TEST_P(ByteReaderOf, NumbersTextsAndListsComeBack) {
   EXPECT_EQ(reader.left(), 0u);
 }
 
-// Lists that are longer than the window are read correctly at every offset within a number and
-// within an AVX2 register.
+// Lists that are longer than the reader's window are read correctly at every offset within a number
+// and within an AVX2 register.
 TEST_P(ByteReaderOf, LongListsAreTheSameHoweverTheyLie) {
   for (std::size_t before = 0; before < 33; ++before) {
     for (const std::size_t n : {0u, 1u, 7u, 8u, 9u, 127u, 20000u}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whole files, parts of files, and paths that are not files.
+// Reads whole files and parts of files, and refuses paths that are not plain files.
 #include "bytes/file_read.h"
 
 #include <gtest/gtest.h>

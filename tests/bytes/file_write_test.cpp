@@ -24,8 +24,9 @@ using testing_support::read_file;
 using Bytes = std::vector<std::uint8_t>;
 namespace fs = std::filesystem;
 
-// The system calls so far, one letter each. The call whose letter is `failing` fails with the error
-// `reason`.
+// The system calls so far, one letter each: o create, w write, s sync, c close, r rename, f sync of
+// the folder. The call whose letter is `failing` fails with the error `reason`. With `in_halves`
+// each write stores only the first half of its bytes.
 std::string asked;
 char failing = 0;
 int reason = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Whole .rzc files: lossless, in parts, cut, damaged.
+// Whole .rzc files: writing and reading is lossless, also of some frames and controls; cut, damaged
+// and too large files are refused.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -265,7 +266,7 @@ TEST(ClipFile, AnotherVersionIsNamed) {
   EXPECT_NE(read.error().message.find("version 9"), std::string::npos);
 }
 
-// A file that this version wrote must remain readable, on every processor.
+// The committed file of format version 1 must remain readable, on every processor.
 TEST(ClipFile, CommittedFileGivesItsCurves) {
   const Bytes bytes = read_file(data_folder() / "clip" / "version1.rzc");
   ASSERT_FALSE(bytes.empty());

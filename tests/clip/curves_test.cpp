@@ -75,8 +75,8 @@ TEST(ClipCurves, RandomBitsDoNotGrow) {
   }
 }
 
-// A smooth curve takes less than a third of its size: predicting a polynomial of degree 4 leaves
-// only rounding errors.
+// A smooth curve takes at most a third of the size of its float32 values: predicting a polynomial
+// of degree 4 leaves only rounding errors.
 TEST(ClipCurves, SmoothOnesAreContinued) {
   const Clip clip = make_all_kinds(512);
   Clip smooth = make_clip(1, 512);

@@ -84,7 +84,8 @@ TEST_F(ClipRecording, WithoutAFolderIsRefused) {
   EXPECT_NE(folder.error().message.find("Is a directory"), std::string::npos);
 }
 
-// The system calls during close(), one letter each. The call whose letter is `failing` fails.
+// The system calls during FileWriter::close(), one letter each: s sync, c close, r rename. The call
+// whose letter is `failing` fails.
 std::string asked;
 char failing = 0;
 

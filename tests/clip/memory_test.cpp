@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Heap memory of a clip's reader and writer.
+// Limits of the heap memory that encoding, decoding and an open reader of a clip take.
 #include <gtest/gtest.h>
 
 #include "clip/file/encoder.h"
@@ -20,8 +20,9 @@ std::size_t size_of(const Clip& clip) {
   return size;
 }
 
-// Limits of heap memory: kTimesTheClip times the clip's size or kTimesTheFile times the file's size
-// (native/README.md documents both), plus kBeside bytes for the frames of a writer's block.
+// Limits of heap memory: kTimesTheClip times the clip's size for encoding and decoding, and
+// kTimesTheFile times the file's size for an open reader (native/README.md documents both), plus
+// kBeside bytes for the frames of a writer's block.
 constexpr std::size_t kTimesTheClip = 4, kTimesTheFile = 16, kBeside = 64 * 1024;
 
 TEST(ClipMemory, OfWritingGrowsWithTheClip) {

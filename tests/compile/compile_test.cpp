@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Dna may have been edited: compile gives a Rig or an error with the field, whatever it holds.
+// An edited Dna may hold anything: compile gives a Rig, or an error that names the field.
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -19,7 +19,7 @@ namespace {
 using namespace testing_support;
 using core::ErrorCode;
 
-// A valid face: two raw controls, one corrective, one joint group, one channel, one map.
+// A valid face: two raw controls, and one GUI control, corrective, joint group, channel and map.
 dna::Dna good_face() {
   dna::Dna dna = make_face(2, 1, 2);
   dna.definition.gui_control_names = names("gui", 1);
@@ -329,8 +329,8 @@ TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {
   EXPECT_NEAR(evaluate_once(rig.value(), {1.0f}, 1).joints[3], 0.5f, 1e-6f);
 }
 
-// Each of 60,000 correctives reads the next one. The time must not grow with the square of their
-// number.
+// Each of 60,000 correctives reads the next one, and the last one reads the raw control. The time
+// must not grow with the square of their number.
 TEST(Compile, LongChainOfCorrectivesCompilesInTime) {
   constexpr std::uint16_t n = 60000;
   dna::Dna dna = make_face(1, n, 1, 1);

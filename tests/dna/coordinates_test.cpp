@@ -245,7 +245,7 @@ std::vector<std::uint8_t> bytes_of(const Dna& dna) {
   return bytes ? *bytes : std::vector<std::uint8_t>{};
 }
 
-// The nine attributes of one joint in one column.
+// The nine attributes of a joint in one column of a joint group; 0 if the group has no row for one.
 std::array<double, 9> column_of(const JointGroup& g, std::size_t joint, std::size_t column) {
   std::array<double, 9> out{};
   const std::size_t columns = g.input_indices.size();
@@ -696,7 +696,8 @@ TEST(DnaCoordinates, RefusesWhatValidateRefuses) {
 
 TEST(DnaCoordinates, RefusesRowsBeyondTheFormat) {
   Dna dna = bare_rig(7282, 1);
-  dna.behavior.joint_groups = std::vector<JointGroup>{make_group({1}, {65535}, {1})};  // its sx
+  dna.behavior.joint_groups =
+      std::vector<JointGroup>{make_group({1}, {65535}, {1})};  // sx of the last joint
   CoordinateTarget target;
   target.axes = CoordinateSystem{4, 2, 1};
   expect_error(dna, target, core::ErrorCode::kInvalidValue,

@@ -65,8 +65,9 @@ void expect_of_every_prefix(const Bytes& bytes, Check check) {
   }
 }
 
-// Calls check(changed bytes, turn) for each of these places: the byte is replaced by 0x00, by 0xFF,
-// and by itself with one bit flipped. `turn` differs between the three calls.
+// Expects that check(changed bytes, turn) returns "" for every kStride-th of the offsets `places`:
+// the byte there is replaced by 0x00, by 0xFF, and by itself with one bit flipped. `turn` differs
+// between the three calls.
 template <class Check>
 void expect_of_every_patch(const Bytes& bytes, const std::vector<std::size_t>& places,
                            Check check) {
@@ -169,8 +170,9 @@ std::uint8_t hex_byte(const std::string& text, std::size_t at) {
   return static_cast<std::uint8_t>(std::stoul(text.substr(at, 2), nullptr, 16));
 }
 
-// Copies the base file up to the place of an edit and applies the edit. An edit is a text
-// OFFSET:BYTES TO REMOVE:BYTES TO INSERT (tests/data/malformed/README.md).
+// Appends to `out` the bytes of the base file from offset `copied` up to the offset of an edit, and
+// the bytes that the edit inserts. `copied` becomes the offset after the removed bytes. An edit is
+// a text OFFSET:NUMBER OF BYTES TO REMOVE:BYTES TO INSERT IN HEX (tests/data/malformed/README.md).
 void apply_edit(const std::string& edit, const Bytes& base, std::size_t& copied, Bytes& out) {
   const std::size_t first = edit.find(':'), second = edit.find(':', first + 1);
   const std::size_t at = std::stoul(edit.substr(0, first));
@@ -214,8 +216,9 @@ TEST(HostileMalformed, FilesAreUsableOrRefusedAsTheirKindAsks) {
 
 // ---- a file that changes during reading
 
-// From a given read on, every byte whose offset leaves the remainder `phase` when divided by 4 is
-// increased by one. For one of the four phases these are the lowest bytes of counts.
+// The first `honest_reads` reads give the bytes of the file. In later reads every byte whose offset
+// leaves the remainder `phase` when divided by 4 is increased by one. For one of the four phases
+// these are the lowest bytes of counts.
 class ChangingSource final : public bytes::Source {
  public:
   ChangingSource(const Bytes& bytes, std::size_t honest_reads, std::uint64_t phase)
@@ -238,8 +241,8 @@ class ChangingSource final : public bytes::Source {
 };
 
 // A file that changes while it is parsed must do no harm: parsing fails, or gives a Dna that can be
-// rewritten. Faces and skin weights are longer than the reader's window, so that they take several
-// reads.
+// rewritten. The polygons and skin weights are longer than the reader's window, so that they take
+// several reads.
 TEST(HostileSource, ThatChangesBetweenTwoReadsIsNoHarm) {
   dna::Dna face = testing_support::make_full_face();
   constexpr std::uint32_t kCount = 30000;

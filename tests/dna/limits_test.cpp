@@ -205,7 +205,7 @@ TEST(DnaJson, KeepsTheSmallestAndLargestFloats) {
 
 // ---- steps
 
-// Tells for each row whether it is kept; every third row is dropped. Counts the queries.
+// A list that says of each row whether it is kept: every third row is dropped. Counts its queries.
 class CountingRows {
  public:
   explicit CountingRows(std::size_t size) : size_(size) {}
@@ -221,8 +221,8 @@ class CountingRows {
   mutable std::size_t asked_ = 0;
 };
 
-// The list of LODs is long and each LOD has all rows. Each row may be queried only once
-// nevertheless.
+// The list of LODs is long and each LOD has all rows. Nevertheless each row may be
+// queried at most once.
 TEST(DnaSteps, OfDroppingRowsDoNotGrowWithTheListOfLods) {
   constexpr std::uint16_t kMost = 65535;
   for (const std::size_t entries : {1u, 5000u}) {

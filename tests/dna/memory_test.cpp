@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Heap memory of a load: its peak, and the memory that remains.
+// Limits of the heap memory that reading a file, JSON in both directions and the LOD filter take.
 #include <cstdio>
 #include <filesystem>
 
@@ -79,8 +79,9 @@ TEST(Memory, OfALoadIsLittleMoreThanWhatItKeeps) {
   std::filesystem::remove(path);
 }
 
-// Limits of heap memory while a file is read. An empty element takes up to 11 times its bytes in
-// the file (a twist setup; a list of lists takes 9). The error's text and path are small.
+// Reading a file takes at most kTimesTheBytes times its size plus kBeside bytes of the heap. An
+// empty element takes up to 11 times its bytes in the file (a twist setup; a list of lists takes
+// 9). kBeside is for the text and the field of an error.
 constexpr std::size_t kTimesTheBytes = 12, kBeside = 16 * 1024;
 
 std::size_t peak_of(const Bytes& bytes, bool* good = nullptr) {
@@ -159,14 +160,14 @@ TEST(Memory, ManyEmptyElementsTakeAFewTimesTheirBytes) {
   }
 }
 
-// Sizes just above a power of two: a list that doubles its capacity then has its old and its new
-// buffer at the same time.
+// Numbers of elements just above a power of two: a list that doubles its capacity then has its old
+// and its new buffer at the same time.
 constexpr std::size_t kSizes[] = {4097, 8193};
-// Heap memory in addition to the factors: windows of readers, messages, and the stack of open
-// containers.
+// Heap memory in bytes in addition to the factors: windows of readers, messages, and the stack of
+// open containers.
 constexpr std::size_t kBesideOthers = 64 * 1024;
-// Limits of heap memory, as factors of the size of the face (kTimesFromJson: of the JSON text);
-// native/README.md documents them.
+// Limits of the heap memory of to_json(), from_json() and filter_lods(), as factors of the size of
+// the face (kTimesFromJson: of the JSON text); native/README.md documents them.
 constexpr std::size_t kTimesToJson = 48, kTimesFromJson = 64, kTimesFiltered = 24;
 
 std::size_t size_of(const Dna& dna) { return static_cast<std::size_t>(size_in_bytes(dna)); }
@@ -224,7 +225,7 @@ TEST(Memory, OfTheLodFilterOfAHeadIsAtMostTwiceTheHead) {
   }
 }
 
-// Lists of numbers and texts that are longer in JSON than in the file.
+// The face has numbers, a text and bytes that are longer in JSON than in the file.
 TEST(Memory, OfJsonGrowsWithItsNumbersAndTexts) {
   for (const std::size_t n : {std::size_t{30'000}, std::size_t{60'000}}) {
     Dna dna;

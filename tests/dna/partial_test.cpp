@@ -105,8 +105,8 @@ std::size_t target_bytes(const BlendShapeTarget& t) {
   return 4 * list(t.vertex_indices.size(), 4) + 2;
 }
 
-// The regions of the bodies of elements. In the file a body is preceded by its size or, in 2.1, by
-// the offset of its end.
+// The regions of the bodies of n elements, of which the first begins at offset `at`. In the file a
+// body is preceded by its size or, in 2.1, by the offset of its end.
 std::vector<Region> sized_elements(const File& file, std::size_t at, std::size_t n) {
   std::vector<Region> out;
   for (std::size_t i = 0; i < n; ++i) {
@@ -292,8 +292,8 @@ bool keeps(const Selection& s, std::size_t lod) {
   return std::ranges::find(s.kept, lod) != s.kept.end();
 }
 
-// Expects that a kept element is read completely and a dropped one is not.
-// In: slack  bytes of the element that may be read together with the number of elements
+// Expects that a kept element is read completely, and at most `slack` bytes of a dropped one.
+// In: slack  for the first element, which may be read together with the number of elements
 void expect_whole_or_untouched(const RecordingSource& source, const Region& element, bool kept,
                                std::size_t slack) {
   if (kept) {
@@ -319,7 +319,7 @@ TEST(PartialLoad, ReadsNothingOfADroppedMesh) {
 }
 
 // The fifth mesh belongs to all LODs and is kept. Of its dropped targets only four small reads each
-// are allowed, which find the end of the target.
+// are allowed, which find the end of the target, and one window that is read ahead.
 TEST(PartialLoad, PassesOverDroppedTargetsOfAKeptMesh) {
   const Mesh mesh = make_head().geometry.meshes[4];
   for (const std::uint16_t minor : {std::uint16_t{8}, std::uint16_t{1}}) {
@@ -432,7 +432,8 @@ TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
   EXPECT_EQ(cut.skin_joint_indices, (Array<std::uint16_t>{0, 1, 0, 1, 0}));
 }
 
-// The first channel of full_face.h gets one control after the other: the last raw one, the
+// The first entry of the blend shape channels of make_full_face() gets one control after the other
+// as its input: the last raw one, the
 // corrective, both controls of networks, and the RBF pose. The channel is dropped if the layer that
 // computes its control is not loaded.
 TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
@@ -460,7 +461,8 @@ TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
 }
 
 // In a file without layer rbfe, as before 2.5, the number of pose controls is the number of poses
-// in rbfb, which must be read. An error in it names its place.
+// in rbfb, which must be read. An error in rbfb names its field and
+// its offset.
 TEST(PartialLoad, SaysWherePosesCannotBeCounted) {
   Dna face = make_full_face();
   face.rbf_behavior_ext = {};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The content of dense groups and its order.
+// regroup() makes a dense joint group of each region, a set of joints that the same controls drive:
+// its rows, columns and coefficients, and their order.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The comparison times the evaluation of both faces only if timing is requested.
+// regroup measures the evaluation time of the face before and after only if timing is requested.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

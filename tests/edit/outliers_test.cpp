@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which small coefficients are removed, and which are kept.
+// regroup() removes small coefficients of controls that are foreign to a region because they move
+// few of its joints, and keeps all others.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

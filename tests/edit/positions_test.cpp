@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The position of a joint includes the motion of its parents.
+// The change of position that regroup reports for a joint includes the motion of its parents.
 #include <cmath>
 
 #include "edit/regrouped.h"
@@ -10,7 +10,8 @@ namespace {
 using namespace regrouping;
 
 TEST(Regroup, NamesThePoseWhereAJointMovedMost) {
-  // A foreign control rotates joint 0 by one degree; its child joint 1 is 10 cm away from it.
+  // Control 1, foreign to the region, rotates joint 0 by one degree; its child joint 1 is 10 cm
+  // away from it.
   dna::Dna dna = with_outliers(0.0f, 0.0f);
   std::vector<float> places(36, 0.0f);
   places[1] = 10.0f;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which joints share a region.
+// regroup() divides the joints into regions by the controls that drive them.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every file that parses is converted to the system that the first 8 bytes choose.
+// Every file that parses is converted to the coordinate system and units that the first 8 bytes
+// choose; the file follows them.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

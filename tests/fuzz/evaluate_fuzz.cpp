@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every file that parses is compiled and evaluated; the first 4 bytes seed the controls.
+// Every file that parses is compiled and evaluated. The first 4 bytes are the seed of the controls,
+// of the options and of the second instruction set.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;
@@ -10,8 +11,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 4) return 0;
   const auto dna = promises::parse({data + 4, size - 4});
   if (!dna) return 0;
-  // The file states the number of correctives without a list of them, but the rig has lists of all
-  // controls for each LOD, and promises::evaluation() for each of at most kFrames frames.
+  // The file states the number of correctives without a list of them, so that the size of the file
+  // does not limit it. The rig has lists of all controls, correctives included, for each LOD, and
+  // promises::evaluation() has one for each of at most kFrames frames. These lists are allowed.
   constexpr std::size_t kFrames = 64;
   const std::size_t lods = dna->descriptor.lod_count;
   bound.allow(16 * (lods + kFrames) * dna->behavior.psd_count);

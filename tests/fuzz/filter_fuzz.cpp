@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The first 8 bytes choose layers, LODs, limits and the kind of source; the rest is the file.
+// Loading a part of a file equals loading all of it and removing the rest. The first 8 bytes choose
+// layers, LODs, limits and the kind of source; the file follows them.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

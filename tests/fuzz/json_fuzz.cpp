@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any text: text that from_json accepts survives to_json and back.
+// Any text: from_json refuses it with a field or an offset, or gives a face that is the same after
+// it was written and read again, as JSON and as a file.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

@@ -28,7 +28,7 @@ constexpr std::size_t kLargestSeed = 4400;  // bytes; larger seeds make every ru
 constexpr std::size_t kLargestBomb = 8000;
 constexpr std::size_t kOptions = risorius::promises::kOptionBytes;
 
-// Bytes that fuzz targets expect before the file. Each entry gives a seed.
+// Bytes that fuzz targets expect before the file. Each entry gives one seed for each file.
 const std::vector<Bytes> kFilters{{0, 0, 0, 0, 0, 0, 0, 0},       {0, 0x20, 1, 0, 0, 0, 0, 0},
                                   {0, 0x80, 0, 0, 0, 0, 0, 0},    {0x1D, 0x83, 1, 0, 0, 0, 0, 0},
                                   {0, 0x14, 0, 0, 200, 20, 9, 0}, {0, 0x0C, 0, 0, 0, 0, 0, 3}};
@@ -63,8 +63,8 @@ class Seeds {
     add_rig(name, *read);
   }
 
-  /// Adds a file whose lists multiply each other, for `evaluate`. It takes as long as a thousand
-  /// other inputs, so that it is run only once and not mutated.
+  /// Adds a file whose lists multiply each other to the folder `bombs`, as inputs for `evaluate`.
+  /// Each takes as long as a thousand other inputs, so that it is run only once and not mutated.
   void add_bomb(const std::string& name, const Bytes& file) {
     put_each("bombs", name, kControls, file, kLargestBomb);
   }
@@ -150,7 +150,8 @@ Bytes written(const dna::Dna& face, std::uint16_t minor) {
 }
 
 // Adds a seed for each layer: the layers desc and defn, this layer, and the layer that it extends
-// if there is one. Small inputs are useful because fuzzers try them most often.
+// if there is one. Also adds a face with a layer of an unknown kind. Small inputs are useful
+// because fuzzers try them most often.
 void add_parts(Seeds& seeds) {
   const dna::Dna face = risorius::testing_support::make_full_face();
   for (const dna::detail::KnownLayer& wanted : dna::detail::kLayers) {
@@ -170,7 +171,8 @@ void add_parts(Seeds& seeds) {
   seeds.add("unknown", *dna::write(unknown, {8, true}, warnings));
 }
 
-// Adds bombs as large as they may be, but so small that n * n steps take less than a second.
+// Adds each bomb with the largest n that gives at most kLargestBomb bytes, but at most 352, so that
+// n * n steps take less than a second.
 void add_bombs(Seeds& seeds) {
   for (const risorius::testing_support::Bomb& bomb : risorius::testing_support::kBombs) {
     std::uint16_t n = 16;

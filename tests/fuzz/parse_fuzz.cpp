@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any bytes: a Dna, or an error with its place; and check agrees.
+// Any bytes: parse gives a Dna, or an error with a field and an offset; check() finds an error
+// exactly if parse does.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A broken promise ends a fuzz target like a crash, including the promise that an input takes at
-// most a few times its size from the heap.
+// A broken promise ends a fuzz target like a crash. One promise is that an input takes at most a
+// given multiple of its size from the heap.
 #pragma once
 
 #include <sanitizer/allocator_interface.h>
@@ -23,7 +23,8 @@ inline void demand(const std::string& broken_promise) {
 
 namespace heap {
 
-// Heap bytes in use and their maximum since the input began. Only one thread allocates.
+// Heap bytes taken and not freed since the last HeapBound was made, and their maximum. Only one
+// thread allocates.
 inline std::ptrdiff_t now = 0, most = 0;
 
 inline void added(const volatile void*, std::size_t size) {
@@ -41,7 +42,8 @@ inline const int kInstalled = __sanitizer_install_malloc_and_free_hooks(added, f
 
 }  // namespace heap
 
-/// Demands that an input of `size` bytes takes at most beside + times * size bytes of the heap.
+/// Demands in its destructor that the heap bytes in use never grew by more than beside + times *
+/// size since its construction, for an input of `size` bytes.
 class HeapBound {
  public:
   HeapBound(std::size_t size, std::size_t times, std::size_t beside)

@@ -54,7 +54,7 @@ def lods_of(about: dict) -> list[int] | None:
 
 
 def require_extra(path: Path, what: str) -> Path:
-    """Skip a test if `path` is missing; the summary of the run names the missing data (`what`)."""
+    """Return `path`; skip the test if it is missing. The run's summary names the data (`what`)."""
     if not path.exists():
         _not_run.add(what)
         pytest.skip(f"extra not run, no data: {what}")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The points of a surface that are closest to other points.
+// The point of a surface that is closest to another point, and the first point that a ray hits.
 #include "register/closest.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sparse linear systems.
+// Solves sparse linear systems by a Cholesky factorization.
 #include "register/sparse.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ TEST(Sparse, RefusesOtherMatrices) {
   const std::vector<std::int32_t> rows{0, 1, 1}, columns{0, 0, 1};
   const std::vector<double> indefinite{1, 2, 1};
   EXPECT_FALSE(SparseCholesky::make(rows, columns, indefinite, 2));
-  EXPECT_FALSE(SparseCholesky::make(rows, columns, indefinite, 1));  // a place outside
+  EXPECT_FALSE(SparseCholesky::make(rows, columns, indefinite, 1));  // an entry outside
   const std::vector<double> few{1, 2};
   EXPECT_FALSE(SparseCholesky::make(rows, columns, few, 2));
 }

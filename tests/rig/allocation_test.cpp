@@ -23,7 +23,7 @@ TEST(Allocation, CounterSeesAnAllocation) {
 }
 
 // Whether a function is noexcept. Evaluation must never throw, because the caller's thread may not
-// be able to handle it.
+// be able to handle an exception.
 template <class F, class... Args>
 constexpr bool never_throws = std::is_nothrow_invocable_v<F, Args...>;
 using Evaluate = void (*)(const Rig&, const float*, std::uint32_t, bool, Workspace&,
@@ -77,7 +77,8 @@ Rig full_rig(const Kind& kind) {
 
 constexpr std::size_t kFilm = 2 * simd::kFrames + 3;  // whole blocks and a partial one
 
-// Frames [kFilm, 5]: neutral, usual values, out of range, NaN, infinite, and usual values again.
+// Raw controls, float32[kFilm, 5]. Six frames repeat: neutral, usual values, out of range, NaN,
+// infinite, and usual values again.
 std::vector<float> film() {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   const float frames[][5] = {{0, 0, 0, 0, 1},

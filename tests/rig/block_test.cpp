@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A compiled face as bytes: changed bytes are a valid face or an error.
+// Opens the bytes of compiled faces: open_rig refuses changed bytes, or takes them as a face that
+// is safe to evaluate.
 #include "rig/block.h"
 
 #include <gtest/gtest.h>
@@ -42,8 +43,8 @@ dna::Dna face_with_everything() {
   return dna;
 }
 
-// A face with networks that read a solver, a solver that reads a corrective, a swing setup, and
-// joints that networks move.
+// A face with a network that reads a pose of a solver, a solver that reads a corrective, a swing
+// setup, and a joint that the network moves.
 dna::Dna face_that_learns() {
   dna::Dna dna = make_face(5, 2, 4, 2);
   dna.definition.lod_joint_mapping.lods = {0, 0};
@@ -208,7 +209,8 @@ std::string refused_field(BlockBytes& changed) {
   return rig ? "taken" : rig.error().where;
 }
 
-// A LOD that places rows which it does not compute would show an earlier frame.
+// At a LOD whose pieces copy rows that the joint groups do not compute, the pose would contain
+// values of an earlier frame.
 TEST(Block, RowsThatNothingComputesAreRefused) {
   const Rig rig = must_compile(face_with_everything());
   BlockBytes level = bytes_of(rig);
@@ -258,7 +260,8 @@ TEST(Block, ColumnsByGroupStayInTheirMatrix) {
   EXPECT_EQ(refused_field(begin), "rig.joint_groups");
 }
 
-// Begins, channels, inputs and rows beyond their arrays are rejected.
+// Values of shape_begins and shapes_of_controls, and inputs and first rows of map_runs, that lie
+// beyond the arrays that they index are rejected.
 TEST(Block, ChannelsAndRunsStayInWhatTheyCountIn) {
   dna::Dna dna = face_with_everything();
   dna.definition.blend_shape_channel_names = names("shape", 2);
@@ -294,7 +297,8 @@ TEST(Block, GroupsNameTheBlocksThatTheyWrite) {
   }
 }
 
-// Evaluation looks extra pieces up by block, so that they must be sorted.
+// Evaluation finds the extra pieces of a block of 16 joint attributes by a binary search, so extra
+// pieces must be sorted by Piece::block.
 TEST(Block, ExtraPiecesOutOfOrderAreRefused) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups = std::vector{make_group({4, 4}, {0}, {2, 0, 22, 20}, {1, 2, 3, 4})};
@@ -313,7 +317,7 @@ TEST(Block, ChannelsOfARunFollowEachOther) {
   dna.behavior.blend_shape_channels.output_indices = {0, 1, 2};
   const Rig rig = must_compile(dna);
   EXPECT_EQ(rig.shape_run, 2u);
-  constexpr std::size_t kRigHeader = 32;  // behind magic, byte order, sizes and hash
+  constexpr std::size_t kRigHeader = 32;  // bytes before the RigHeader
   for (const std::uint32_t run : {3u, 4u}) {
     BlockBytes changed = bytes_of(rig);
     std::memcpy(changed.data() + kRigHeader + offsetof(RigHeader, shape_run), &run, sizeof(run));
@@ -321,10 +325,11 @@ TEST(Block, ChannelsOfARunFollowEachOther) {
   }
 }
 
-// The number of regions has no array behind it. A small block must not demand a large workspace.
+// No array of the rig's bytes limits mask_count, the number of masks of the networks' regions. A
+// few bytes must not demand a large workspace.
 TEST(Block, ScratchIsHeldAgainstTheBlock) {
   const Rig rig = must_compile(face_with_everything());
-  constexpr std::size_t kRigHeader = 32;  // behind magic, byte order, sizes and hash
+  constexpr std::size_t kRigHeader = 32;  // bytes before the RigHeader
   BlockBytes forged = bytes_of(rig);
   const std::uint32_t regions = 0x00FFFFFF;  // 64 MB of masks
   std::memcpy(forged.data() + kRigHeader + offsetof(RigHeader, mask_count), &regions,
@@ -342,8 +347,8 @@ TEST(Block, ANetworkWritesNoMoreThanItsOwnValues) {
   for (std::size_t i = 0; i < rig.ml_operations.size(); ++i) {
     MlOperation& operation = operations[i];
     if (operation.kind == MlOperation::kMlp && networks++ == 0) operation.value_count -= 1;
-    // Another operation gets the removed value, so that the total still equals the number in the
-    // header.
+    // Another operation gets the value that the network lost, so that the sum of all value_count
+    // still equals the number in the header.
     if (operation.kind == MlOperation::kScatter && scatters++ == 0) {
       operation.values_begin = 0, operation.value_count = 1;
     }

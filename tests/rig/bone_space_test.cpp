@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Converts poses of joints to transforms of bones in other axes and units.
 #include "rig/outputs/bone_space.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +44,7 @@ TEST(BoneSpace, AxesAndUnitsAreExchanged) {
   const Channels out =
       channels_of(y_up(), {0, 0, 0}, {100, 200, 300, 0, 90, 0, 0.1f, 0.2f, 0.3f}, {0});
   expect_near(out.location, {1, -3, 2});
-  expect_near(out.rotation, {kHalf, 0, 0, kHalf});  // about the file's y is about z
+  expect_near(out.rotation, {kHalf, 0, 0, kHalf});  // the file's y axis becomes z
   expect_near(out.scale, {1.1f, 1.3f, 1.2f});
 }
 

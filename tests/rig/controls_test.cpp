@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The optional check of raw controls, and the explanation of a solver's poses.
+// The optional check that raw controls are finite, and the distances and weights of the poses of an
+// RBF solver.
 #include <gtest/gtest.h>
 
 #include <limits>

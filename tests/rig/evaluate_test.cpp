@@ -314,7 +314,7 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
     for (const std::uint32_t lod : {0u, 1u}) {
       std::vector<float> sums(kMaps);
       const std::size_t count = lod == 0 ? kRows : kRows / 2 + 1;
-      bool found = false;  // the row of the run that counts
+      bool found = false;  // whether an earlier row of this run counts
       for (std::size_t i = 0; i < count; ++i) {
         const bool begins = i == 0 || inputs[i] != inputs[i - 1] || outputs[i] != outputs[i - 1];
         const float v = raw[inputs[i]];
@@ -338,8 +338,8 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
 
 // ---- blend shapes
 
-// With few active controls each lists its channels; with many, every channel reads its control. The
-// result must be the same.
+// With few active controls each active control lists its channels; with many, every channel reads
+// its control. The result must be the same.
 TEST(EvaluateShapes, ChannelsFollowTheirControlsHoweverManyAreActive) {
   constexpr std::uint16_t kRaw = 64, kShapes = 150;
   std::mt19937 random(6);

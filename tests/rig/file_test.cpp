@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A compiled face in a file, written by anybody.
+// Opens files of compiled faces, which anybody may have written or changed.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -56,7 +56,8 @@ class RigFile : public testing::Test {
   core::Result<Rig> open(const path& file, Trust trust, ReadBy by = ReadBy::kCopy) {
     return open_rig_file(file, trust, by, simd::scalar_kernels());
   }
-  // Expects that a file is rejected with an error that names the file and a field.
+  // Expects that a file of these bytes is rejected with an error for the field `where`, whose
+  // message begins with the path of the file and contains `words`.
   void expect_refused(const Bytes& bytes, Trust trust, const std::string& where,
                       const std::string& words = "") {
     const path file = write(bytes);
@@ -116,7 +117,8 @@ TEST_F(RigFile, PrefixesAndMoreBytesAreRefused) {
 }
 
 // The fields of the header begin at these bytes: magic 0, version 7, byte order 8, header size 12,
-// size 16, hash 24, numbers 32.
+// size 16, hash 24, the numbers of
+// RigHeader 32.
 TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
   const auto flipped = [&](std::size_t at) { return static_cast<std::uint8_t>(bytes_[at] ^ 1); };
   for (const Trust trust : kTrusts) {
@@ -133,8 +135,8 @@ TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
   }
 }
 
-// Every 13th byte gets a flipped bit. Arrays begin on multiples of 64, so that each array and the
-// gaps between arrays are hit.
+// One bit is flipped at a time, in every 13th byte in turn. Arrays begin on multiples of 64, so
+// that each array together with the gap after it is hit at least four times.
 TEST_F(RigFile, AFlippedBitOfOnesOwnFileIsFound) {
   const path file = folder_ / "face.rig";
   for (std::size_t at = 0; at < bytes_.size(); at += 13) {
@@ -187,8 +189,8 @@ TEST_F(RigFile, AFolderThatIsNotThereCannotBeWritten) {
 
 constexpr uid_t kNobody = 65534;
 
-// The wrong index shows which check was made: only the full check finds it. The rights of the file
-// decide about the check.
+// The wrong index shows which check was made: only the full check finds it. With Trust::kOwner the
+// rights of the file decide about the check.
 TEST_F(RigFile, AFileThatOthersMayWriteGetsTheFullCheck) {
   const path file = write(with_wild_index());
   for (const ReadBy by : {ReadBy::kCopy, ReadBy::kMap}) {

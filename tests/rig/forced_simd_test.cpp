@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// A rig uses the table of kernels with which it was compiled, and RISORIUS_SIMD chooses this table.
 #include <cstdlib>
 
 #include "support/face.h"

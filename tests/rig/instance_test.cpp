@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// A face in a sequence of frames: a corrective or a network that reads a later stage gets its value
+// from the frame before.
 #include "rig/stages/instance.h"
 
 #include "rig/stages/evaluate.h"
@@ -68,8 +70,8 @@ TEST(Instance, FacesOfOneRigKeepTheirOwnState) {
   EXPECT_EQ(a.evaluate(&half).controls[2], 0.5f);
 }
 
-// The first network copies control 0, a corrective copies its output, and the second network copies
-// the corrective.
+// The first network copies control 0 to control 2, corrective 1 copies control 2, and the second
+// network copies corrective 1 to control 3. In the list of networks the second one has index 0.
 dna::Dna networks_around_a_corrective() {
   dna::Dna dna = make_face(1, 1, 1);
   dna.behavior.psds.rows = {1};

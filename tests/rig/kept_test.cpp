@@ -16,7 +16,8 @@ using namespace testing_support;
 constexpr std::size_t kInputs = 12, kCorrectives = 40, kBones = 30, kLevels = 3;
 
 // The evaluator has two ways to find the active channels. A face with 20 channels (seed 1) looks at
-// every channel in most frames. A face with 150 channels looks only at channels of active controls.
+// every channel in most frames. A face with 150 channels looks only at the channels of active
+// controls at LOD 0.
 void add_channels(dna::Dna& dna, std::uint32_t seed) {
   const std::size_t count = seed == 1 ? 20 : 150;
   dna.definition.blend_shape_channel_names = names("shape", count);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Compiles the blend shape targets of a mesh of three vertices, and adds them with weights.
 #include "rig/outputs/morph.h"
 
 #include "support/face.h"
@@ -17,7 +18,7 @@ dna::BlendShapeTarget make_target(std::uint16_t channel, std::vector<std::uint32
   return t;
 }
 
-// A face with a mesh of three vertices, three channels, and these targets.
+// A face with three channels and a mesh of three vertices, which has the given targets.
 dna::Dna face_with_mesh(std::vector<dna::BlendShapeTarget> targets) {
   dna::Dna dna = make_face(0, 0, 1);
   dna.definition.blend_shape_channel_names = names("shape", 3);

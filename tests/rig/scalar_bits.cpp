@@ -161,8 +161,8 @@ bool add(const dna::Dna& dna, compile::Precision precision, Numbers& numbers, Ha
   return true;
 }
 
-// Adds the matrices of a chain of bones, and the deformed vertices with 0 to 15 influences each, to
-// the hash.
+// Adds the matrices of a chain of random bones, and deformed vertices with 0 to 15 influences each,
+// to the hash. Returns false if chain or influences are rejected.
 bool add_skin(Numbers& numbers, Hash& hash) {
   constexpr std::uint32_t kBones = 20, kVertices = 200;
   std::vector<std::int32_t> parents;

@@ -280,7 +280,7 @@ TEST(Skin, VerticesWithoutWeightStayToTheBit) {
   mesh.points = {0.1f, 0.2f, 0.3f, 0.1f, 0.2f, 0.3f, 0.1f, 0.2f, 0.3f, 0, 0, 0};
   std::vector<float> matrices(24, 0.0f);
   for (std::size_t i = 0; i < 24; ++i) matrices[i] = i % 12 % 5 == 0 ? 1.0f : 0.0f;
-  matrices[3] = matrices[15] = 2;  // both move by 2
+  matrices[3] = matrices[15] = 2;  // both bones move by 2 along x
   const std::vector<float> out = evaluated(kernels(), mesh, matrices);
   for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(out[i], mesh.points[i]);
   EXPECT_NEAR(out[9], 2.0f, 1e-6f);  // even if the sum of its weights is tiny
@@ -300,7 +300,7 @@ TEST(Skin, WhatIsNotFiniteSpoilsTheVerticesOfItsBoneAlone) {
   Mesh mesh = random_mesh(500, counts, 50, 12);
   const std::vector<float> clean = evaluated(kernels(), mesh, matrices);
   // The matrix of bone 0 is NaN. Vertices must become NaN only if they have a weight on it,
-  // although groups are filled up with influences of weight 0.
+  // although vertices with fewer influences get further ones of weight 0.
   for (std::size_t i = 0; i < 12; ++i) matrices[i] = kNaN;
   mesh.points[0] = kNaN;
   const std::vector<float> out = evaluated(kernels(), mesh, matrices);

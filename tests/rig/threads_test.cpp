@@ -35,7 +35,8 @@ Rig full_rig(const CompileOptions& options) {
   return std::move(rig).value();
 }
 
-// Frame n of an animation in which a jaw moves and a quaternion rotates.
+// The raw controls of make_full_face in frame n of an animation: a jaw moves, and a quaternion
+// rotates.
 std::vector<float> frame(std::size_t n) {
   const float jaw = static_cast<float>(n % 5) / 4.0f;
   const float side = static_cast<float>(n % 3) * 0.48f;  // 0, 0.48, 0.96
@@ -161,7 +162,8 @@ TEST(OneRig, SealsItsBlockOnceWhoeverAsksFirst) {
   EXPECT_EQ(rig.block().data(), Rig(rig).block().data());
 }
 
-// The parts of a DirectFace for the rig of make_full_face, with two meshes of several blocks.
+// The parts of a DirectFace for the rig of make_full_face, with two equal meshes, each of six
+// blocks of at most kSkinBlock vertices.
 FaceParts many_blocks(const Rig& rig) {
   constexpr std::uint32_t kVertices = 5 * kSkinBlock + 7;
   FaceParts parts;
@@ -193,7 +195,7 @@ FaceParts many_blocks(const Rig& rig) {
 
 TEST(OneRig, GivesFacesInAnyNumberOfThreadsTheVerticesOfEachAlone) {
   const Rig rig = full_rig({});
-  std::vector<std::vector<std::vector<float>>> all;  // for each number of threads, the meshes
+  std::vector<std::vector<std::vector<float>>> all;  // [number of threads][2 * face + mesh]
   for (const std::size_t threads : {1u, 2u, 5u, 8u}) {
     std::vector<std::unique_ptr<DirectFace>> faces;
     std::vector<DirectFace*> pointers;

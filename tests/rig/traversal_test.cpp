@@ -17,7 +17,8 @@ using namespace testing_support;
 
 constexpr std::size_t kRaw = 24, kJoints = 40;
 
-// Joint groups of 1 to 90 rows, with fewer rows at each coarser LOD. Some groups write the same
+// Joint groups of 1 to 90 rows, with about half of the rows of the next finer LOD, or none, at LODs
+// 1 and 2. Some groups write the same
 // attributes, and some attributes between them have no row.
 dna::Dna many_groups() {
   std::mt19937 random(11);
@@ -53,8 +54,8 @@ std::vector<float> some_active(std::size_t n, std::uint32_t seed) {
   return raw;
 }
 
-// The value of a row, computed in double from the matrix of the file, and the largest possible
-// error of a float32 sum.
+// The value of a joint attribute, computed in double from the matrices of the file, and the largest
+// possible error of a float32 sum.
 struct Expected {
   double value = 0, bound = 0;
 };
@@ -162,8 +163,8 @@ TEST_P(Traversals, OfABatchGiveTheBitsOfTheFrameAlone) {
   }
 }
 
-// A group without active columns that shares a block with an active group must be 0, and not show
-// the frame before.
+// The attributes of a group without active columns that share a block of 16 attributes with an
+// active group must be 0, and not keep their values of the frame before.
 TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   const Rig rig = must_compile(dna_, kernels_);
   Workspace work = make_batch_workspace(rig), fresh = make_workspace(rig);
@@ -191,8 +192,8 @@ TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   }
 }
 
-// An Instance sets only those blocks to 0 that the frame before wrote. Nothing of that frame may
-// remain.
+// An Instance sets only those blocks of joint attributes to 0 that the frame before wrote. No value
+// of that frame may remain.
 TEST_P(Traversals, OfAnInstanceLeaveNothingOfTheFrameBefore) {
   const Rig rig = must_compile(dna_, kernels_);
   Instance face(rig);

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// The table of kernels, the inner loops for one instruction set, is chosen by its name, by the
+// environment variable RISORIUS_SIMD, or as the best table of the CPU.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -10,7 +12,8 @@
 namespace risorius::simd {
 namespace {
 
-// Sets RISORIUS_SIMD while the object exists, and restores it afterwards.
+// Sets RISORIUS_SIMD while the object exists. Its destructor restores the value; a variable that
+// was not set becomes empty, which find_kernels treats alike.
 class Environment {
  public:
   explicit Environment(const char* value) {

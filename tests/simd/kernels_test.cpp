@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compares every instruction set with sums in double, at sizes around the ends of loops.
+// Compares the kernels of every instruction set with plain computations, for example sums in
+// double, at sizes around the ends of vector loops.
 #include "simd/kernels.h"
 
 #include <gtest/gtest.h>
@@ -24,8 +25,8 @@ const Kernels& scalar_kernels_unoptimised();
 
 namespace {
 
-// A matrix stored as columns without padding. After the last column there is a vector of further
-// values, because kernels may read it.
+// A matrix stored as columns without padding. After the last column there are kWidest further
+// values, because kernels read whole vectors.
 template <class T>
 struct Matrix {
   std::size_t rows, columns;
@@ -58,7 +59,7 @@ std::vector<std::uint32_t> every_second(std::size_t n, std::size_t rows) {
   return offsets;
 }
 
-// The first n columns, with weight number i for column i.
+// A Column for each of the first n offsets; column i has weight index i.
 std::vector<Column> columns_of(const std::vector<std::uint32_t>& offsets, std::size_t n) {
   std::vector<Column> columns;
   for (std::size_t i = 0; i < n; ++i)
@@ -78,9 +79,9 @@ std::vector<std::string> all_kernels() {
 double value(float v) { return v; }
 double value(std::uint16_t v) { return from_half(v); }
 
-// Expects that sums of n products have at most the error of rounding. In any order, fused or not,
-// it is at most n * eps * sum|w v| to first order; one more eps covers the second order for these
-// n.
+// Expects that out[r] is, for each row r, the sum of the n products of weights[i * step] and
+// m.values[offsets[i] + r], up to the error of rounding. In any order, fused or not, this error is
+// at most n * eps * sum|w v| to first order; one more eps covers the second order for these n.
 template <class T>
 void expect_sums(const Matrix<T>& m, const std::vector<std::uint32_t>& offsets,
                  const float* weights, std::size_t step, std::size_t n, const float* out) {
@@ -328,7 +329,7 @@ TEST_P(SimdKernels, PlaceMoreWithoutChangingOtherPlaces) {
   for (int i = 0; i < 200; ++i) {
     const auto mask = static_cast<std::uint16_t>(random() % 0x10000);
     const Piece piece{static_cast<std::uint32_t>(random() % 400), mask, 2};
-    std::vector<float> to(3 * kPlaces), expected;  // no place behind the block is written
+    std::vector<float> to(3 * kPlaces), expected;  // a write after the block is out of range
     for (std::size_t p = 0; p < to.size(); ++p) to[p] = -static_cast<float>(p + 1);
     expected = to;
     std::uint32_t next = piece.from;
@@ -369,8 +370,8 @@ struct Turn {
   float parity;
 };
 
-// The product of three rotations about axes, in double precision. In: angles  radians about x, y
-// and z
+// The quaternion (x, y, z, w) of rotations about three axes, of which the first in turn.order is
+// applied first, in double. In: angles  float[3], radians about x, y and z
 std::array<double, 4> product_of_turns(const Turn& turn, const float* angles) {
   std::array<double, 4> q{0, 0, 0, 1};
   for (const std::uint8_t axis : turn.order) {
@@ -439,7 +440,7 @@ TEST_P(SimdKernels, TurnRotationsTogetherAsAlone) {
         if (i % one_in == 1 % one_in) rotations[i * kStride + i % 3] = angle(random);
         rotations[i * kStride + 3] = 7.0f;  // old content of the memory
       }
-      rotations[5 * kStride] = -0.0f;  // counts as turning, by nothing
+      rotations[5 * kStride] = -0.0f;  // is treated as a rotation by 0
       const std::vector<float> angles = rotations;
       std::vector<float> alone = rotations;
       kernels_.quaternions({}, which.data(), kCount, rotations.data(), kStride);
@@ -478,8 +479,8 @@ TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
   }
 }
 
-// Skins ten vertices with eight influences each, in three groups. The three floats after the
-// vertices must not be written.
+// Skins ten vertices with eight influences each, in three groups of kSkinGroup vertices. The three
+// floats after the vertices must not be written.
 std::vector<float> skinned(const Kernels& kernels) {
   std::mt19937 random(8);
   const Matrix<float> matrices = random_matrix(12, 5, random),

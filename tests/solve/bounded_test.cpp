@@ -21,9 +21,11 @@ Doubles random(std::mt19937& random, std::size_t n, double low, double high) {
   return out;
 }
 
-/// How far x violates the conditions of a minimum with bounds; 0: not at all.
-/// In: slope  gradient of the smooth part
-///     kink   slope of the sparse part on both sides of x = rest
+/// How far x violates the conditions of a minimum with bounds; 0: not at all. Expects x to be
+/// within its bounds. In: slope      gradient of the smooth part at x
+///     low, high  bounds of x
+///     rest       values of x at which the sparse part is 0
+///     kink       slope of the sparse part on both sides of x = rest
 double violation(const Doubles& x, const Doubles& slope, const Doubles& low, const Doubles& high,
                  const Doubles& rest, const Doubles& kink) {
   double worst = 0.0;
@@ -60,7 +62,7 @@ TEST(LeastChange, MeetsTheConditionsOfTheLeast) {
   for (int i = 0; i < 60; ++i) {
     const std::size_t rows = 1 + static_cast<std::size_t>(i) % 9, columns = 40;
     const Doubles a = random(numbers, rows * columns, -1, 1);
-    // In every second case many targets are too large to be reached.
+    // In every second case many values of b are too large to be reached within the bounds.
     const Doubles b = random(numbers, rows, -1, 1.0 + 20.0 * (i % 2));
     const Doubles low = random(numbers, columns, -0.4, 0), high = random(numbers, columns, 0, 0.4);
     const double ridge = i % 3 == 0 ? 1.0 : 1e-6;

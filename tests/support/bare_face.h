@@ -15,7 +15,8 @@ inline std::vector<std::string> names(const char* stem, std::size_t n) {
   return out;
 }
 
-/// A face without behavior: joints at the origin, all children of the first.
+/// A face with counts and names but without behavior. All joints are at the origin; joint 0 is the
+/// root and the parent of all others. The `psds` correctives have no rows.
 inline dna::Dna make_face(std::size_t raw, std::uint16_t psds, std::size_t joints,
                           std::uint16_t lods = 2) {
   dna::Dna dna;

@@ -52,7 +52,7 @@ inline dna::Dna shared_poses(std::uint16_t n) {
   return dna;
 }
 
-/// n solvers that read and write one control, and n correctives that read it.
+/// n solvers that read and write raw control 0, and n correctives that read it.
 inline dna::Dna graph(std::uint16_t n) {
   dna::Dna dna = make_face(1, n, 1, 1);
   dna::RbfSolver solver;
@@ -74,7 +74,7 @@ inline dna::Dna graph(std::uint16_t n) {
   return dna;
 }
 
-/// A GUI table with n rows for one control, each with its own interval.
+/// A GUI table with n rows from one GUI control to one raw control, each with its own interval.
 inline dna::Dna gui(std::uint16_t n) {
   dna::Dna dna = make_face(1, 0, 1, 1);
   dna.definition.gui_control_names = names("gui", 1);

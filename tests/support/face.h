@@ -29,8 +29,8 @@ inline dna::JointGroup make_group(std::vector<std::uint16_t> lods,
   return g;
 }
 
-/// A joint group whose row r copies control inputs[r] to attribute r, so that a pose shows these
-/// controls and every LOD reads them.
+/// A joint group for all LODs whose row r copies control inputs[r] to joint attribute r (attribute
+/// r % 9 of joint r / 9), so that Pose::joints shows the values of these controls.
 inline dna::JointGroup make_probe(const std::vector<std::uint16_t>& inputs, std::size_t lods = 2) {
   const std::size_t n = inputs.size();
   std::vector<std::uint16_t> outputs(n);

@@ -21,8 +21,8 @@ inline std::vector<std::uint8_t> read_file(const std::filesystem::path& path) {
 
 inline std::filesystem::path data_folder() { return RISORIUS_TEST_DATA; }
 
-/// A folder inside the folder RISORIUS_SHARED, or an empty path if there is none. The caller then
-/// reports that its test did not run.
+/// The folder `name` inside the folder that RISORIUS_SHARED names, or an empty path if the variable
+/// is not set or the folder does not exist. The caller then reports that its test did not run.
 inline std::filesystem::path shared_folder(const std::string& name) {
   const char* shared = std::getenv("RISORIUS_SHARED");
   if (shared == nullptr) return {};

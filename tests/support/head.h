@@ -18,8 +18,9 @@ namespace risorius::testing_support {
 using Bytes = std::vector<std::uint8_t>;
 
 /// Sizes of a generated head. LOD l has its own mesh with vertices >> l vertices and channels >> l
-/// blend shape channels. Each blend shape target of a mesh has deltas >> l deltas. One more mesh,
-/// of all vertices, belongs to every LOD and has targets for all channels.
+/// blend shape channels; each of its blend shape targets has deltas >> l deltas. One more mesh
+/// belongs to every LOD: it has `vertices` vertices, and targets of `deltas` deltas for all
+/// channels.
 struct HeadSizes {
   std::uint16_t lods = 4, joints = 60, raw = 100, channels = 32;
   std::uint32_t vertices = 6000, deltas = 1500, joint_groups = 8;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Replaces malloc and the other functions of the heap by functions that count the bytes in use and
+// then call glibc.
 #include "support/heap.h"
 
 #include <malloc.h>

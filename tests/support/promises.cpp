@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Checks promises of the native code about any bytes. Each function with a text as result returns
+// the broken promise, or kKept (no text). Numbers are moderate if results must be finite; a forged
+// rig is opened from changed bytes.
 #include "support/promises.h"
 
 #include <algorithm>
@@ -42,7 +45,8 @@ std::string broken(const std::string& promise, const core::Error& error) {
 
 // ---- sources that are not memory
 
-// A file that the parser can read only in pieces. From a given read on, every byte is changed.
+// A file that the parser can read only in pieces. The first `honest_reads` reads give the bytes of
+// the file; later reads give each byte plus 1.
 class PieceSource final : public bytes::Source {
  public:
   PieceSource(View bytes, std::size_t honest_reads) : bytes_(bytes), honest_(honest_reads) {}
@@ -210,7 +214,7 @@ rig::Pose pose_of(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
 enum class Origin { kCompiled, kForged };
 
 // Checks that the first and the last frame of a batch equal these frames evaluated alone; the last
-// frame has other controls.
+// frame has half the controls. The batch of a forged rig is evaluated but not compared.
 std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, bool settle,
                   Origin origin) {
   constexpr std::size_t kCount = simd::kFrames + 3;
@@ -239,9 +243,9 @@ std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
   return kKept;
 }
 
-// Checks that all three ways to visit the columns of a joint group give the same joints. -0 equals
-// 0: a product below the float range may leave a sum at -0, which the column of a control at 0
-// changes to 0.
+// Checks that all three ways to visit the columns of a joint group give the same joints; those of a
+// forged rig are not compared. -0 equals 0: a product below the float range may leave a sum at -0,
+// which the column of a control at 0 changes to 0.
 std::string traversals(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, Origin origin) {
   rig::Workspace work = rig::make_workspace(rig);
   rig::Pose listed = rig::make_pose(rig), whole = listed, added = listed;
@@ -272,8 +276,9 @@ std::string instance(const rig::Rig& rig, const Controls& raw, std::uint32_t lod
   return kKept;
 }
 
-// Evaluates a rig in every way, at LODs 0 to 3 and the last one. Out: poses  the settled pose of
-// each LOD
+// Evaluates a rig in every way at LODs 0 to 3, but not further than one number after its last LOD.
+// At its last LOD, if that is above 3, only one settled pose is made. Out: poses  the settled pose
+// of each LOD is appended
 std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<rig::Pose>& poses,
                          Origin origin = Origin::kCompiled) {
   for (std::uint32_t lod = 0; lod <= std::min(rig.lod_count, 3u); ++lod) {
@@ -286,7 +291,8 @@ std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<r
   return kKept;
 }
 
-// Checks that the bytes of a rig can be opened as a rig with the same pose.
+// Checks that the bytes of a rig can be opened as a rig that gives the `expected` pose: the settled
+// pose of LOD 0.
 std::string reopened(const rig::Rig& rig, const Controls& raw, const rig::Pose& expected) {
   const auto owner = core::allocate_pages(rig.block().size());
   std::ranges::copy(rig.block(), owner.get());
@@ -323,9 +329,9 @@ std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
 }
 
 // Compares the poses of the scalar kernels, `a`, with those of another instruction set, `b`. SSE4
-// must give the same bits. For other sets the joints are compared with a tolerance, and only if the
-// controls are equal and small, because a control that differs in its last bits may select another
-// row of a table.
+// must give the same bits. For other sets the joints are compared with a tolerance, and only if all
+// controls are equal and at most 2 in size, because a control that differs in its last bits may
+// select another row of a table.
 // In:  tame  whether the numbers of face and input are moderate; false: only the bits of SSE4 are
 //            compared
 // Out: kKept, or the broken promise
@@ -430,7 +436,8 @@ Result<Dna> parse_as(View bytes, const Filter& f, std::size_t honest_reads) {
   return dna::parse(source, f.options);
 }
 
-// Removes from a completely loaded Dna the layers that `o` would have left out when loading.
+// Removes from a completely loaded Dna the layers that `o` would have left out when loading, and
+// counts the controls of these layers in unread_controls if `o` loads the definition.
 Dna without_layers(Dna dna, const ParseOptions& o) {
   const dna::ControlCounts controls = dna::control_counts(dna);
   const bool uncounted = !o.definition;
@@ -470,8 +477,8 @@ bool is_comparable(const ParseOptions& o) {
   return (o.definition || !some) && (o.behavior || !o.rbf_behavior);
 }
 
-// Whether writing failed because a network, pose or setup needs an unloaded control, which is
-// allowed.
+// Whether writing may have failed because a network, pose or setup needs an unloaded control, which
+// is allowed: the error is an invalid argument, and some controls are not loaded.
 bool lacks_controls(const Dna& dna, const core::Error& error) {
   return error.code == ErrorCode::kInvalidArgument &&
          !(dna.unread_controls == dna::UnreadControls{});

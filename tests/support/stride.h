@@ -29,9 +29,10 @@ struct Steps {
   std::size_t first, step;
 };
 
-// The bytes that a run of a test program changes. The program runs once for each instruction set,
-// and each run changes different bytes, so that together they omit few. A changed byte has the same
-// effect with every instruction set.
+// The bytes that a run of a test program changes. The program runs once for each instruction set
+// of the processor, named in RISORIUS_SIMD, and each run changes other bytes, so that together they
+// omit few: a changed byte has the same effect with every instruction set. If the variable is not
+// set, the only run changes every kStride-th byte.
 inline Steps shared_steps() {
   constexpr std::string_view kSets[] = {"scalar", "sse4", "avx2", "avx512", "neon"};
   constexpr std::size_t kOfOneProcessor = 4, kStep = std::max(kStride, kOfOneProcessor);

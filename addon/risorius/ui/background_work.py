@@ -53,7 +53,9 @@ class RunsBeside(_Base):
     def modal(self, context: Context, event: bpy.types.Event) -> Result:
         """Blender calls this with each event: Esc cancels, the timer shows progress and finishes.
 
-        Args: context, event  of the operator.
+        Args:
+            context: context of the operator.
+            event: the current event.
         """
         if event.type == "ESC":
             self.cancel(context)
@@ -84,7 +86,11 @@ class RunsBeside(_Base):
         raise NotImplementedError
 
     def shown(self, share: int) -> str:
-        """The text of the status bar. Args: share  finished part of the task, 0 to 100."""
+        """The text of the status bar.
+
+        Args:
+            share: finished part of the task in per cent, 0 to 100.
+        """
         raise NotImplementedError
 
     def cancelled_text(self) -> str:

@@ -121,7 +121,8 @@ def face_controls(context: Context) -> ArmatureObject:
     """The control armature of the active face, for operators whose poll requires a face.
 
     Raises:
-        FaceError: no face is active, or the active face has lost its control armature.
+        FaceError: no face is active, the active face has lost its control armature, or the native
+            module cannot be used.
     """
     controls = active_controls(context)
     if controls is None:
@@ -139,9 +140,9 @@ class FaceOperator(OperatorBase):
     """Base of operators on the active face. Class attributes define which faces are suitable."""
 
     bl_options = {"REGISTER", "UNDO"}
-    whole_face = True  # the face needs its control armature and its DNA
-    baked_too = False  # faces with baked actions are accepted
-    by_sliders = False  # a face that its face board moves is rejected
+    whole_face = True  # whether the face needs its control armature and its DNA
+    baked_too = False  # whether faces with baked actions are accepted
+    by_sliders = False  # whether a face that its face board moves is rejected
 
     @classmethod
     def poll(cls, context: Context) -> bool:

@@ -25,8 +25,8 @@ def people(name: str = "package") -> ModuleType:
         name: name of the entry point: `package` makes people, `command` is `risorius sample`.
 
     Raises:
-        NoPeopleError: the wheel is not installed, or its version is not the version of this
-            package.
+        NoPeopleError: the wheel is not installed or has no such entry point, or its version is not
+            the version of this package.
     """
     for entry in metadata.entry_points(group=GROUP, name=name):
         found = entry.dist.version if entry.dist else __version__

@@ -24,7 +24,7 @@ _STAYS = (
     "cornea",
     "teeth",
     "tongue",
-)  # parts of names of groups of the base mesh that stay symmetric
+)  # a group of the base mesh stays symmetric if its name contains one of these, but not "lash"
 
 
 def askew(source: Source, body: Body, person: Person) -> Floats:
@@ -47,7 +47,7 @@ def askew(source: Source, body: Body, person: Person) -> Floats:
 
 
 def set_askew(dna: Dna, parts: list[Part], shape: Floats, unit: float) -> None:
-    """Adds the asymmetry shape to the meshes of all LODs.
+    """Adds the asymmetry shape to the vertex positions of the meshes of all LODs.
 
     Args:
         dna: a face made of `parts`; each vertex of its other, coarser meshes has the position of a

@@ -39,7 +39,7 @@ from .polygons import (
 )
 from .source import BaseMesh, Source
 
-CM = 10.0  # centimetres per decimetre, the unit of the data
+CM = 10.0  # centimetres per decimetre: the data are in decimetres
 FLUSH = ("head_flush_L", "head_flush_R")
 PARTS = {  # mesh -> (groups of the base mesh, subdivisions at LOD 0, subdivisions at LOD 1)
     "head": (["body"], 1, 0),
@@ -70,7 +70,7 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
                 base.uvs,
                 count,
             )
-            # The cut at the neck drops the body below it; the other meshes are all above the cut.
+            # The cut at the neck drops the body below it; the tongue is above the cut.
             aside = np.hypot(base.positions[:, 0], 0.35)  # makes the cut round in front
             height = base.positions[:, 1] - NECK_SLOPE * aside
             polygons, operator = clip_below(polygons, height, NECK_CUT)
@@ -129,7 +129,9 @@ def euler_xyz(rotation: Floats) -> Floats:
 
 
 def add_skin(mesh: Mesh, weights: Floats) -> None:
-    """Adds skin weights to a mesh; weights of 0.001 or less are left out.
+    """Adds skin weights to a mesh.
+
+    Weights of 0.001 or less are left out; the others are scaled so that they sum to 1.
 
     Args:
         mesh: the mesh; changed.
@@ -148,7 +150,7 @@ def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
     """The geometry and skin weights of a part as a mesh in centimetres.
 
     Args:
-        part: part of the base mesh.
+        part: the polygons, and the operators that compute their vertices from the base mesh.
         positions: float64[V, 3], all vertices of the base mesh, in decimetres.
         weights: float64[v, 9], skin weights of the part's vertices.
     """
@@ -361,7 +363,7 @@ def assemble(
             jaw = raw.index("jawOpen")
             for pair, way in correctives.items():
                 delta = part.carry(way)
-                if pair in body.closing:  # this delta is not rotated by the open jaw
+                if pair in body.closing:  # corrected, so that the jaw joint does not rotate it
                     open_jaw = units["jawOpen"]
                     both = ex.Expression(part.carry(open_jaw.displacement) + delta, open_jaw.joints)
                     delta = bind_displacement(p, w, both, joints) - deltas[jaw]

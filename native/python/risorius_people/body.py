@@ -18,13 +18,14 @@ from .polygons import Floats, Ints
 from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
 
-FLOOR = 8.168  # height of the soles in decimetres below the origin of the data
+FLOOR = 8.168  # decimetres from the soles up to the origin of the data
 # The neck is cut where y - NECK_SLOPE * hypot(x, 0.35) equals this (base mesh, in decimetres).
 NECK_CUT = 5.36
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035  # decimetres of the upper teeth that show below the lip of an open mouth
 # Heights above the collar's seam in decimetres: expressions do not move skin below the first
-# height, because it would come through the shirt; they fully move skin above the second.
+# height, because it would come through the shirt; they fully move skin above the second. The
+# neckThroat expressions are excepted.
 COVERED = (0.06, 0.4)
 REACH = 1.3  # largest |x| of head and neck: the hands are as high as the neck, but farther out
 # (name, parent) of each joint.
@@ -163,7 +164,8 @@ def skin_weights(
     """Skin weights [V, 9] of the base mesh's vertices for the nine JOINTS; rows sum to 1.
 
     A vertex's weight of the jaw joint is the vertex's displacement by jawOpen along the rigid
-    motion of the jaw joint, as a fraction of this motion.
+    motion of the jaw joint, as a fraction of this motion. The tongue follows the jaw joint alone,
+    each eye its eye joint, and each row of teeth its teeth joint.
 
     Args:
         positions: float64[V, 3], in decimetres.
@@ -203,8 +205,8 @@ class Body:
         positions: float64[V, 3], in decimetres.
         joints: name of a joint -> float64[3], its position.
         units: raw control -> its expression.
-        closing: two raw controls -> float64[V, 3], the displacement that closes lips which the jaw
-            has opened.
+        closing: ("jawOpen", raw control) -> float64[V, 3], the displacement that closes lips which
+            the jaw has opened, wholly or in a part of the mouth.
         eyes: positions of the eyeballs, and rest pose of their lids.
         lip_rim: int64[n], vertices of the lower lip's rim, where the upper lip touches it.
         eye_correctives: two raw controls -> float64[V, 3], the displacement that keeps the lids on
@@ -221,7 +223,8 @@ class Body:
         self.positions = shaped(source, base, person)
         self.positions[:, 1] += FLOOR if man else -self.positions[groups["body"], 1].min()
         self.eyes = Eyes(base, groups, self.positions, person.age)
-        self._raw = self.positions.copy()  # positions before eyes and lips are adjusted
+        # positions with placed eyeballs, before lids, lips and teeth are adjusted
+        self._raw = self.positions.copy()
         self._ways: dict[str, Floats] = {}  # raw control -> displacement before eyes are adjusted
         self.man: Body = self
         self._change: Proportions | None = None
@@ -264,7 +267,7 @@ class Body:
         above = (collar_heights(base.positions) - rests) / (free - rests)
         held = np.ones((count, 1))
         held[groups["body"]] = smooth_step(above[groups["body"]])[:, None]
-        for name, way in moved.items():  # only breathing moves the pit of the throat
+        for name, way in moved.items():  # only neckThroat controls move the pit of the throat
             self.units[name].displacement = way if "neckThroat" in name else way * held
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
         ex.leave_bones(self.units, groups, self.positions, self.joints)

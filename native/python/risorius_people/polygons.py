@@ -124,7 +124,8 @@ def compact_uvs(mesh: Polygons) -> Polygons:
 
 
 def subdivide(mesh: Polygons) -> tuple[Polygons, Operator]:
-    """Subdivides once by Catmull-Clark; texture coordinates are subdivided linearly.
+    """Subdivides once by Catmull-Clark; texture coordinates are subdivided linearly. Returns the
+    new mesh, and the operator that converts values of the old vertices to the new ones.
 
     E. Catmull and J. Clark, "Recursively generated B-spline surfaces on arbitrary topological
     meshes", 1978; borders become cubic B-spline curves.

@@ -21,7 +21,9 @@ _RINGS = 25  # rounds in which the change of form is smoothed over neighbouring 
 _WITH_SKIN = "eyelashes"  # groups with this in their name follow the nearest skin
 _SKIN = "body"
 _JAW = "helper-lower-teeth"
-_REST = 0.005  # decimetres: vertices that the jaw moves less than this get no jaw motion
+# decimetres: the jaw motion of a vertex fades out if the rigid motion of the jaw moves the vertex
+# by little more than this or less
+_REST = 0.005
 
 
 class Proportions:

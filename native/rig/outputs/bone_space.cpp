@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Converts poses of a file's joints to transforms of another program's bones, in the axes and units
+// of that program. A transform is relative to the rest pose of the bone, the neutral pose of its
+// joint.
 #include "rig/outputs/bone_space.h"
 
 #include <cmath>

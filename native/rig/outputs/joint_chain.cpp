@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+// Computes the skinning matrices of an armature's bones, parents before children. An Affine has the
+// upper three rows of a matrix; its fourth row is 0 0 0 1.
 #include "rig/outputs/joint_chain.h"
 
 #include <algorithm>
@@ -87,7 +89,8 @@ Result<std::vector<std::uint32_t>> sorted(std::span<const std::int32_t> parents)
   return order;
 }
 
-// T(location) R(rotation) S(scale) as in Blender: a quaternion of length 0 is half a turn about x.
+// The matrix T(location) R(rotation) S(scale), as in Blender: the rotation is a quaternion w x y z
+// of any length; length 0 is half a turn about x.
 Affine basis(const float* location, const float* rotation, const float* scale) {
   double q[4] = {rotation[0], rotation[1], rotation[2], rotation[3]};
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Adds the weighted displacements (deltas) of a mesh's blend shape targets to its base vertices.
 #include "rig/outputs/morph.h"
 
 #include <algorithm>

@@ -1,4 +1,8 @@
 // SPDX-License-Identifier: MIT
+// Packs the weights of a mesh's vertices on bones for the skinning kernels, and deforms the
+// vertices. The vertices are divided into blocks of 1,024. In a block, the vertices with the same
+// number of influences, rounded up to a multiple of four, form a run, which is stored in groups of
+// four vertices.
 #include "rig/outputs/skin.h"
 
 #include <algorithm>

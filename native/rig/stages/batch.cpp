@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Evaluates several frames with one Rig. Up to 8 frames (kFrames) form a block, which reads the
+// matrices of the joint groups once; a control is active in a block if it is not 0 in one of the
+// frames.
 #include <algorithm>
 #include <bit>
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The stages that compute all other controls from the raw ones: networks, solvers and correctives.
+// A corrective is a product of other controls, its factors. A watched corrective is in the list of
+// one of its factors, its watcher, and is not visited while the watcher is 0.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -46,9 +48,10 @@ bool rests_any(const Rig& rig, const Psd& psd, auto rests) noexcept {
   return std::any_of(factors, factors + psd.factor_count, rests);
 }
 
-// Lists the watched correctives that may not be 0: their watcher and Watch::other are not 0. If the
-// evaluation before had the same active controls, its list is used again, and correctives with any
-// factor at 0 are removed from it; for a single evaluation this test takes longer than it saves.
+// Lists the watched correctives that can differ from 0, because their watcher and Watch::other are
+// not 0. If the evaluation before had the same active controls, its list is used again, and
+// correctives with any factor at 0 are removed from it; for a single evaluation this test takes
+// longer than it saves.
 // In:  kept    the evaluation before had the same active controls
 //      rests   rests(control): whether a control is 0
 // Out: work    firing, firing_count, fires_all
@@ -82,16 +85,17 @@ class Correctives {
   Correctives(const Rig& rig, Workspace& work, float* controls)
       : rig_(rig), work_(work), controls_(controls) {}
 
-  // Computes the watched correctives. In: active  controls that are not 0, without the correctives;
-  // kept  as in list_firing
+  // Computes the watched correctives.
+  // In: active  controls that are not 0, without the correctives
+  //     kept    the evaluation before had the same active controls
   void watched(std::uint32_t lod, std::span<const std::uint16_t> active, bool kept) noexcept {
     const auto rests = [this](std::uint16_t control) { return controls_[control] == 0.0f; };
     list_firing(rig_, lod, active, kept, work_, rests);
     for (std::size_t i = 0; i < work_.firing_count; ++i) {
       const Psd& psd = rig_.psds[work_.firing[i]];
       const float value = corrective(rig_, psd, controls_);
-      // The value is 0 times NaN. It must be 0 here, because other evaluations skip a corrective
-      // with a factor at 0.
+      // A product of 0 and NaN or infinity is NaN. The corrective must be 0 here, because other
+      // evaluations skip a corrective with a factor at 0.
       if (std::isnan(value) && rests_any(rig_, psd, rests)) continue;
       set(psd.output, value);
     }
@@ -135,10 +139,10 @@ std::uint32_t touch_column(const Rig& rig, std::uint32_t column) noexcept {
   return rig.is_half() ? rig.joint_halves[at] : std::bit_cast<std::uint32_t>(rig.joint_values[at]);
 }
 
-// Reads one value of every list that these controls will need. These reads do not depend on each
-// other, so that a cold cache loads them in parallel, and their pages are in memory when the
-// columns are read. In a batch only the first frame does it, because the other frames need mostly
-// the same memory.
+// Reads one value of every list (columns and watched correctives) of the given controls. These
+// reads do not depend on each other, so that a cold cache loads them in parallel, and their pages
+// are in memory when the columns are read. In a batch only the first frame does it, because the
+// other frames need mostly the same memory.
 void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> controls,
            Workspace& work) noexcept {
   const std::uint32_t* watches =
@@ -248,8 +252,8 @@ std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   return n;
 }
 
-// Computes a corrective of four frames. Products and roundings have the same order as in
-// corrective(). The result is 0 instead of NaN in frames in which a factor is 0.
+// Computes a corrective of four frames. Products and roundings have the same order as for a single
+// frame, in corrective(). The result is 0 instead of NaN in frames in which a factor is 0.
 // In: values  [controls, kFrames], from the first of the four frames on
 simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
                             const float* values) noexcept {

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// Evaluates raw controls to a pose: first all other controls, then joints, blend shape channels and
+// animated maps. A settled evaluation computes each control after the controls that it reads; an
+// unsettled one has the fixed order of the reference evaluator.
 #include "rig/stages/evaluate.h"
 
 #include <algorithm>

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+// A face in a sequence of frames, with the latency of the reference evaluator: networks, solvers
+// and correctives run in this order, and each reads the results of later stages from the frame
+// before.
 #include "rig/stages/instance.h"
 
 #include <algorithm>

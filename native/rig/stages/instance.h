@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Instance: a face through time, as in the reference.
+// Instance: a face in a sequence of frames, with the state and the latency of the reference
+// evaluator.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Neural networks: the operations of their graph, and the joints that they move.
+// Neural networks: the operations of their graph (gather reads controls, scatter writes controls),
+// and the joints that the networks move.
 // From: dna-format 12.3, 12.5
 #include <algorithm>
 #include <cmath>
@@ -49,7 +50,8 @@ void run_layer(const Rig& rig, const MlLayer& layer, std::uint32_t rows, const f
   activate(layer, out, rows);
 }
 
-// Copies the values that an operation reads from other operations to one list, at most `most`.
+// Copies the values that an operation reads from other operations to one list of at most `most`
+// values.
 // Out: number of values
 std::uint32_t join(const Rig& rig, const MlOperation& op, const float* values, std::uint32_t most,
                    float* to) noexcept {

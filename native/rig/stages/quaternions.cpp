@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Joints rotated by quaternions, and Euler angles as quaternions. From: dna-format 12.5
+// Quaternion joints, which are turned by the product of the rotations of their columns, one for
+// each control; and joints whose Euler angles are converted to quaternions. From: dna-format 12.5
 #include <algorithm>
 #include <bit>
 #include <cmath>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Radial solvers, computed in double: an arc cosine near 1 loses half of its digits.
+// Radial solvers, which weight their poses by the distances of the input controls from the targets
+// of the poses. Computed in double: an arc cosine near 1 loses half of its digits.
 // From: dna-format 12.4
 #include "rig/stages/rbf.h"
 

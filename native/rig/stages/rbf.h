@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Radial solvers: their arithmetic, shared with the compiler, which inverts the matrices of their
-// targets; and the weights of their poses for explanations.
+// Radial solvers, which weight their poses by the distances of the input controls from the targets
+// of the poses. The compiler shares their arithmetic, because it inverts the matrices of the
+// weights between targets; solver_poses() explains the weights of a result.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The stages of an evaluation. Private to native/rig/stages.
+// The stages of an evaluation. Private to native/rig/stages. A control is active if it is not 0.
+// Its columns, the coefficients of the joint groups, are summed to rows, one for each joint
+// attribute that a group moves.
 #pragma once
 
 #include <array>
@@ -53,8 +55,8 @@ void run_operation(const Rig& rig, std::uint32_t index, std::uint32_t lod, Works
 /// Runs one RBF solver. Overwrites the output controls of its poses.
 void run_solver(const Rig& rig, std::uint32_t index, Workspace& work, float* controls) noexcept;
 
-/// bits_of_eight combines eight floats by OR: the upper and the lower half of the result have the
-/// bits that any float of odd or even index has. kSigns are the sign bits of both halves.
+/// The sign bits of both halves of bits_of_eight(), which combines the bits of eight floats by OR:
+/// the floats with even index in one half of the result, the floats with odd index in the other.
 constexpr std::uint64_t kSigns = 0x8000'0000'8000'0000;
 inline std::uint64_t bits_of_eight(const float* numbers) noexcept {
   std::uint64_t pairs[4];

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Conditional tables: animated maps, and GUI controls to raw controls and back.
+// Conditional tables, which turn controls into animated maps, and GUI controls into raw controls
+// and back; and blend shape channels, which copy controls. A row of a table adds slope * input +
+// cut to its output while the input is between its bounds; neighbouring rows with the same input
+// and output form a run, of which the first row that applies counts.
 #include "rig/stages/tables.h"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// GUI controls <-> raw controls.
+// Converts GUI controls (the sliders of the rig's control panel) to raw controls (the inputs of an
+// evaluation) and back.
 #pragma once
 
 #include "rig/rig.h"

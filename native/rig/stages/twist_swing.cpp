@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Twist and swing setups. From: dna-format 12.5
+// Twist and swing setups: four controls are a rotation, which consists of a twist about an axis and
+// a swing of that axis. Joints of a setup get shares of the twist or the swing.
+// From: dna-format 12.5
 #include <cmath>
 
 #include "rig/stages/stages.h"

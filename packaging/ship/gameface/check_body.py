@@ -31,7 +31,7 @@ LICENCE = {
 }  # fmt: skip
 VERSIONS = {"body_new": "1.0", "body_old": "0.x"}
 LONGER = 5
-SWINGS_MM = 1.0  # at least, half a second after the head turned
+SWINGS_MM = 1.0  # least distance that a hair vertex must swing after the head has turned
 
 
 def long_haired(face: Path) -> Any:

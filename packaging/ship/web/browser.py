@@ -66,7 +66,18 @@ class Browser:
         return await self.open_address(page.resolve().as_uri(), width, height, phone)
 
     async def open_address(self, address: str, width: int, height: int, phone: bool = False) -> str:
-        """Open a URL; arguments and result are as in open()."""
+        """Open a URL and wait until the page is ready or reports an error.
+
+        Args:
+            address: the URL.
+            width, height: size of the window in CSS pixels.
+            phone: emulate a phone with a touch screen.
+
+        Returns: the page's state, body.dataset.state.
+
+        Raises:
+            RuntimeError: the page is still loading after SECONDS.
+        """
         await self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone,

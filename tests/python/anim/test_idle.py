@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests idle movement: equal for equal seeds, in range, with measured speeds and frequencies."""
+"""Tests idle movement: equal for equal seeds, in range, as fast and as frequent as people's."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_blinks_come_as_often_and_last_as_long_as_peoples():
     assert all(b.open > 2.2 * b.close for b in blinks)
     gaps = np.concatenate([np.diff([b.start for b in some]) for some in everything])
     assert np.mean(gaps) > 1.15 * np.median(gaps)  # long tails, as in log-normal intervals
-    assert 0.02 < (gaps < 0.6).mean() < 0.25  # share of double blinks
+    assert 0.02 < (gaps < 0.6).mean() < 0.25  # fraction of short gaps: double blinks
     for some in everything:
         assert all(b.start >= a.end for a, b in pairwise(some))
 

@@ -35,7 +35,7 @@ def strip(side):
 
 @pytest.fixture(scope="module")
 def template(head):
-    """The test head with eyes, teeth and lashes, as a Dna."""
+    """The test head with eyes, teeth and the lashes of the left eye, as a Dna."""
     face = part("head", head.points, head.faces)
     face.shapes = dict(head.ways)
     lashes = part("eyelashes", *strip(1))

@@ -35,7 +35,7 @@ STANDS = Hints("head.obj", up=Y, front=Z)  # a search takes 1/6 s, 3 s without k
 def formed(seed: int) -> np.ndarray:
     form = head_form()
     parts = np.zeros(len(form.parts))
-    parts[:40] = np.random.default_rng(seed).normal(size=40) * 0.7  # those that a search varies
+    parts[:40] = np.random.default_rng(seed).normal(size=40) * 0.7  # a search varies these
     return form.shaped(parts, np.zeros(len(form.expressions)))
 
 

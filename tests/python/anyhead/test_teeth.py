@@ -6,6 +6,7 @@ Also tested: pairs of balls may be eyes, the search for a face can be stopped, a
 
 from __future__ import annotations
 
+import dataclasses
 from functools import cache
 
 import jointed_face
@@ -20,6 +21,7 @@ from risorius.anyhead.form.teeth import JawChange, jaw_change, shown_by
 from risorius.anyhead.landmarks.find import Hints, find_form
 from risorius.anyhead.surface import Surface
 from risorius.anyhead.transfer.carrying import Carrying
+from risorius.anyhead.transfer.form import softened
 from risorius.anyhead.transfer.template import Jaw, TemplateFace
 from risorius.author.geometry import skeleton as sk
 from risorius.author.geometry.rigid import rigid_way
@@ -91,9 +93,41 @@ def test_what_the_jaw_takes_along_moves_as_the_teeth_do() -> None:
     teeth = JawChange(np.array([0.0, -6.0, 3.0]), np.array([0.0, -6.3, 3.1]), 1.1 * np.eye(3))
     got = Carrying(face, points, np.ones(len(points)), teeth).carried(pose)
     chin = np.argmax((points[:, 2] - points[:, 1]) * (np.abs(points[:, 0]) < 1))
-    moved = 1.1 * rigid_way(teeth.before[None], hinge, rotation, shift)[0]
+    change = np.log(1.1)
+    size = np.exp(change * (change**2 + 0.75 * 0.1**2) / (change**2 + 0.1**2))
+    moved = size * rigid_way(teeth.before[None], hinge, rotation, shift)[0]
     wanted = rigid_way(points, teeth.after, rotation, moved)
     assert np.linalg.norm(got[chin] - wanted[chin]) < 0.01
+    unsure = dataclasses.replace(teeth, sure=False)
+    by_skin, same = (
+        Carrying(face, points, np.ones(len(points)), told).carried(pose) for told in (None, unsure)
+    )
+    assert np.array_equal(same, by_skin)
+    assert np.linalg.norm(by_skin[chin] - got[chin]) > 0.02
+
+
+def test_a_closed_mouth_stays_closed_on_another_jaw() -> None:
+    points = mean().points
+    hinge, rotation = np.array([0.0, -1.0, -7.0]), turn(20)
+    opening = np.where(points[:, 1:2] < -7, rigid_way(points, hinge, rotation, np.zeros(3)), 0.0)
+    ways = {("jawOpen",): opening.astype(np.float32), ("mouthClose",): -opening.astype(np.float32)}
+    face = TemplateFace("", mean(), 0, ("jawOpen", "mouthClose"), ways,
+                        Jaw(hinge, {("jawOpen",): (rotation, np.zeros(3))}))  # fmt: skip
+    other = points * [1.2, 0.9, 1.1]
+    both = [Carrying(face, other, np.ones(len(points))).carried(pose) for pose in ways]
+    assert np.abs(both[0]).max() > 1.0
+    assert np.abs(both[0] + both[1]).max() < 1e-6
+
+
+def test_small_changes_of_form_count_less_than_large_ones() -> None:
+    turned = turn(30) @ np.diag([1.05, 1.0, 1.6])
+    soft = softened(turned, 0.6)
+    left, stretch, right = np.linalg.svd(soft)
+    assert np.abs(left @ right - turn(30)).max() < 1e-9
+    small, large = np.log([1.05, 1.6])
+    assert 0.6 < np.log(stretch[1]) / small < 0.7
+    assert abs(stretch[2] - 1) < 1e-9
+    assert 0.95 < np.log(stretch[0]) / large < 1
 
 
 def test_the_joint_of_the_jaw_moves_so_that_the_teeth_do() -> None:
@@ -178,3 +212,6 @@ def test_lids_go_until_they_meet() -> None:
     assert np.abs(gap).max() < 0.02
     brow = grid[:, 1] > 0.85
     assert np.abs(got[brow] - way[brow]).max() < 0.02
+    aside = narrow + [[0.03, 0, 0.05]] * (grid[:, 1:2] > 0)  # the upper lid stands elsewhere
+    met = aside + Carrying(face, aside, np.ones(len(grid))).carried(pose)
+    assert np.abs(met[edge] - met[below]).max() < 0.02

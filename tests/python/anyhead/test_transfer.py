@@ -22,7 +22,12 @@ NAMES = {"mouthSmileLeft": SMILE, "eyeBlinkLeft": BLINK, "jawOpen": "jawOpen"}
 
 
 def face(unit="cm", scale=1.0):
-    """(face in a unit, displacements of its three expressions in cm, and of its corrective)."""
+    """(face, displacements of its three expressions in cm, displacement of its corrective in cm).
+
+    Args:
+        unit: unit that the face states.
+        scale: factor of all lengths of the face in cm.
+    """
     points, faces = face_shapes.head()
     ways = {NAMES[n]: d for n, d in face_shapes.expressions(points).items() if n in NAMES}
     mesh = ObjMesh(scale * points, np.zeros((0, 2)), faces.tolist(), [[]] * len(faces))

@@ -73,7 +73,7 @@ def tolerated(times=1.0):
 
 
 def posed(dna, controls):
-    """Posed vertices in metres.
+    """Posed vertices in metres and in Blender's axes.
 
     Args:
         controls: raw control without prefix -> value; others are 0.

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Tests of faces of many vertices: simplified for the fit, finished in blocks, held sparsely."""
+"""Tests rigs of faces with many vertices.
+
+Joints are fitted to a simplified mesh, the rest is computed in blocks of vertices, and shapes are
+stored sparsely.
+"""
 
 import numpy as np
 import pytest

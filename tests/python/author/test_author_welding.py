@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests that double vertices along seams are merged, but not those of lips that touch."""
+"""Tests that double vertices along seams are merged, but not vertices of lips that touch."""
 
 import command_line
 import face_shapes

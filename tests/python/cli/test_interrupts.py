@@ -26,7 +26,8 @@ COMMANDS = {
     "sample": ["sample", "build", "out.dna", "--data", "in.whl"],
     "bench": ["bench", CORE, "--frames", "in.npz"],
 }
-# Runs a command that ignores SIGINT. A preexec_fn could wait for ever for a lock of another thread.
+# Words before a command that let it ignore SIGINT. They replace a preexec_fn, which could wait for
+# ever for a lock of another thread.
 IGNORING = ["sh", "-c", 'trap "" INT; exec "$@"', "sh"]
 needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names")
 

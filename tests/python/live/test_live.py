@@ -428,7 +428,7 @@ def test_subjects_that_stream_keep_their_places():
     fed(receiver, v6(0, face(), "one more"), 1.2)
     assert list(receiver.status().subjects) == names
     assert receiver.status().reasons[0][0].startswith("32 subjects are heard at once")
-    fed(receiver, v6(0, face(), "one more"), 3.0)  # they fell silent; the second of them goes
+    fed(receiver, v6(0, face(), "one more"), 3.0)  # the others fell silent; names[1] makes room
     assert list(receiver.status().subjects) == [names[0], *names[2:], "one more"]
 
 

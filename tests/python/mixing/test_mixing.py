@@ -29,7 +29,10 @@ OPTIONS = RigOptions(FitOptions(joints=24, rounds=4), lods=LodOptions(count=3))
 
 
 def stretched(dna, factors, lift):
-    """A copy of a face with blend shapes, scaled by `factors` and then raised by `lift`."""
+    """A copy of a face with blend shapes, scaled by `factors` (x, y, z) and then raised by `lift`.
+
+    Joint 0 stays where it was; `lift` is in the file's unit.
+    """
     out = copy.deepcopy(dna)
     meshes = []
     for mesh in out.meshes:
@@ -67,7 +70,10 @@ def faces(tmp_path_factory):
 
 
 def dense_joints(dna):
-    """Values of all joint groups as one matrix, float64[rows, columns]."""
+    """Values of all joint groups as one matrix, float64[9 * joints, controls].
+
+    The controls are the raw controls and the correctives.
+    """
     out = np.zeros((9 * len(dna.joint_names), len(dna.raw_control_names) + dna.psd_count))
     for group in dna.joint_groups:
         out[np.ix_(group.output_indices, group.input_indices)] += group.values

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests that mixing, solving and authoring use memory in proportion to their files.
+"""Tests that mixing, solving and authoring use memory in proportion to the size of their input.
 
 Large counts in a file must not lead to dense tables.
 """

@@ -160,7 +160,10 @@ def packed():
 
 
 def skinned(dna, rig, raw, mesh_index, lod):
-    """Vertices of a mesh by linear blend skinning in float64, computed without the package."""
+    """Vertices of a mesh for the pose that the rig evaluates, float64[V, 3] in the file's unit.
+
+    Blend shapes and linear blend skinning are computed without the package.
+    """
     pose = rig.evaluate(raw, lod=lod)
     mesh = dna.meshes[mesh_index]
     p = np.asarray(mesh.positions, float).copy()

@@ -222,7 +222,10 @@ def stage():
 
 
 def _lying(dna, roots_x, way):
-    """Hairs of length 0.3 along x or -x (way 1 or -1), whose ends are 0.03 above the skin."""
+    """Hairs on the mesh of `stage` along x or -x (`way` 1 or -1), with roots at x = roots_x.
+
+    They reach 0.3 decimetres far, and end 0.03 decimetres above the skin at rest.
+    """
     n = len(roots_x)
     at = np.column_stack([roots_x, np.zeros(n), np.full(n, 0.02)])
     roots = nearest_places(dna.meshes[0].positions.astype(float), *corners_of(dna.meshes[0]), at)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Tests that rebuilt joint groups give the same poses, without small values of other regions.
+"""Tests that rebuilt joint groups give the same poses, apart from the values that were removed.
+
+With a threshold, regroup removes small values by which controls move joints of foreign regions.
 
 The test reads the joint groups of a file independently of the package: a dense matrix for each LOD,
 in which the last group that writes a row is used.

@@ -133,13 +133,13 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
     bake(ready, character, 0, {"npz": tmp_path / "out.npz"})
     with np.load(tmp_path / "out.npz") as out:
         assert out["blend_shapes"][:, 0] == pytest.approx([0.0, 1.0], abs=4e-3)
-    # If a clip has a curve of one of these controls, no curves of head controls are added.
+    # If a clip has a curve of a raw control of the head's rotation, here head.qx, none is added.
     own = clip.replaced(names=[*names, "head.qx"], curves=np.vstack([clip.curves, [[0, 0]]]))
     assert prepared(own, character).names == own.names
 
 
 def neck_face(folder):
-    """A face whose last joint is neck_02, which gets half of the neck rotation of a clip."""
+    """(Dna, loaded face): the last joint is neck_02, which gets half of a clip's neck rotation."""
     dna = face()
     dna.joint_names = ["spine", "neck_01", "neck_02"]
     dna.raw_control_names = ["jaw", *(f"neck_02.q{part}" for part in PARTS)]

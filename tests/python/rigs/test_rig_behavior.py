@@ -378,7 +378,7 @@ def test_batch_rows_are_single_evaluations(name, simd, rotation):
 
 
 def random_raw(rng, dna):
-    """Random controls, in 30 % of calls zeros; quaternions of setups and solvers are unit ones."""
+    """Random controls, in 30 % of calls zeros; controls of a quaternion always have unit length."""
     raw = rng.uniform(0, 1, len(dna.raw_control_names)) * (rng.random() < 0.7)
     names = list(dna.raw_control_names)
     for i, name in enumerate(names):
@@ -463,7 +463,11 @@ def test_rotation_is_one_of_two():
 
 
 def one_pose_solver(threshold):
-    """A rig with a solver of one pose at 0: it writes 1 - x to a control that moves a joint."""
+    """A rig with a solver of one pose at 0: it writes 1 - x to a control that moves a joint.
+
+    Args:
+        threshold: weight threshold of the solver.
+    """
     dna = risorius.Dna()
     dna.lod_count, dna.rotation_unit = 1, "radians"
     dna.raw_control_names, dna.joint_names, dna.joint_parents = ["x"], ["joint"], [0]

@@ -141,7 +141,10 @@ def unreal_animation(curves: dict[str, dict[float, float]], mode: str = "RCIM_Li
 
 
 def rhubarb_tsv(cues: list[tuple[float, float, str]]) -> str:
-    """Rhubarb's TSV: start in seconds, tab, shape; then X at the end of the last cue."""
+    """Rhubarb's TSV: start in seconds, tab, shape; then X at the end of the last cue.
+
+    cues: (start in seconds, end in seconds, mouth shape); each cue begins where the last one ends.
+    """
     lines = [f"{start:.2f}\t{shape}\n" for start, _, shape in cues]
     return "".join(lines) + f"{cues[-1][1]:.2f}\tX\n"
 

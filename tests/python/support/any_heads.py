@@ -46,7 +46,8 @@ def form(directions: np.ndarray, seed: int = 0, size: float = 12.0) -> np.ndarra
 
     Args:
         directions: float64[n, 3] unit vectors.
-        seed: 0: the template; other seeds change proportions and the places and heights of bumps.
+        seed: 0: the template; other seeds change proportions and the places, widths and heights of
+            bumps.
         size: half the height of the head, in any unit.
     """
     random = np.random.default_rng(seed)
@@ -100,7 +101,7 @@ def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.n
 
 
 def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 0) -> list:
-    """(vertex index, its position in `true`) for each landmark in MARKS.
+    """(template vertex at the landmark, its position in `true` plus an error) for each of MARKS.
 
     Args:
         template: head by formula.

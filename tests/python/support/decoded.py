@@ -317,7 +317,7 @@ def stride(keys, values):
 
 
 class Names:
-    """The names of all elements in a file, in the order of their indices."""
+    """The names of all elements in a file, and its networks, in the order of their indices."""
 
     def __init__(self, view):
         d = view["definition"]
@@ -329,7 +329,7 @@ class Names:
 
 
 def by_name(view, unmapped=None):
-    """Replace indices in a decoded file by names.
+    """Replace indices of joints, channels, maps, meshes and networks in a decoded file by names.
 
     Args:
         view: result of decoded(), or a decoded golden file.
@@ -443,7 +443,7 @@ def _mesh_by_name(m, own, old):
 
 
 def _operations_by_name(ext, own, old):
-    """Operations with the contents of networks, without network indices and LOD row counts."""
+    """Operations with networks in place of their indices; joint outputs as [name, attribute]."""
     mlp = 3
     width = stride(ext["jointsParameterKeys"], ext["jointsParameterValues"])
     types = [

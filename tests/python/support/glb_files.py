@@ -120,8 +120,8 @@ def egg(path, *, sparse=True, change=None, matrices=None):
         matrices: values of an additional MAT4 accessor.
 
     Returns:
-        Positions in m, float64[V, 3]; name of a shape -> displacements in m; texture coordinates
-        of all written vertices, which include the duplicates.
+        Positions in m before the nodes' transform, float64[V, 3]; name of a shape -> displacements
+        in m; texture coordinates of all written vertices, which include the duplicates.
     """
     positions, faces = face_shapes.head()
     moved = face_shapes.expressions(positions)

@@ -81,7 +81,8 @@ class GlbFile:
         Args:
             name: name of the node that has the mesh.
             weights: morph target -> weight; all others are 0.
-            kind: attribute of the vertices to return; only positions are moved into the scene.
+            kind: attribute of the vertices to return; only positions are moved into the scene: by
+                the skin, or by the scale and translation of the node if it has no skin.
             world: node index -> float64[4, 4], world matrices of joints; None: at rest.
 
         """

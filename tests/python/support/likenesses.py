@@ -153,7 +153,7 @@ def everything_in_one():
 
 
 def face_cap():
-    """A head like Face Cap's with shape names such as browDown_L; eyes and teeth have no shapes."""
+    """A head like Face Cap's with shape names such as eyeBlink_L; only the head has shapes."""
     points, faces, shapes = skull()
     spelled = {n: n.replace("Left", "_L").replace("Right", "_R") for n in shapes}
     return [
@@ -180,7 +180,8 @@ def save_glb(path, meshes, materials=(), images=()):
 
     Args:
         path: path of the file.
-        meshes: results of `mesh`, optionally with the key `material`, an index of materials.
+        meshes: results of `mesh`, optionally with the key `material`, an index of materials, or
+            `primitives`, a list of (triangles, index of a material or None).
         materials: JSON of the materials.
         images: contents of PNG files; each becomes a texture.
     """

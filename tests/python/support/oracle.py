@@ -150,6 +150,14 @@ def quaternion_rotations(dna, group, rows, inputs, joints, bounds):
     Also sets their error bounds: float32 products of n unit quaternions err by about 8 (n + 2) eps,
     the reference's arc sine by 1e-6; both are divided by the squared cosine of the middle Euler
     angle.
+
+    Args:
+        dna: the Dna.
+        group: the joint group; only joints whose rotation it writes are calculated.
+        rows: number of rows of the group at the LOD.
+        inputs: values of the group's controls, one per column.
+        joints: float64[9 * J] joint values, in the file's units; changed.
+        bounds: float64[9 * J] error bounds of `joints`; changed.
     """
     matrix = np.asarray(group.values, float)
     outputs = np.asarray(group.output_indices)

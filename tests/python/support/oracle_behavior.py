@@ -269,7 +269,10 @@ def initial_controls(dna, count):
 
 
 def frame(dna, solvers, c, lod, masks=None):
-    """Run one frame with the raw controls in `c`, and set all other controls in `c`."""
+    """Run one frame with the raw controls in `c`, and set all other controls in `c`.
+
+    masks: float[regions], 0 switches the networks of a region off; None: none is off.
+    """
     regions = sum(len(mesh) for mesh in dna.machine_learned_behavior.region_network_indices)
     run_networks(dna, lod, c, np.ones(regions) if masks is None else masks)
     run_solvers(dna, solvers, lod, c)

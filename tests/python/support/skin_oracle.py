@@ -10,7 +10,10 @@ SIDE = 14  # vertices along a side of the face's patch
 
 
 def skinned(dna, pose, mesh=0):
-    """Vertices of a posed mesh in the file's units, float64[V, 3]; rotation order x, y, z."""
+    """Vertices of a posed mesh in the file's units, float64[V, 3].
+
+    The file's angles are in degrees, with the rotation order x, y, z.
+    """
     geometry = dna.meshes[mesh]
     points = geometry.positions.astype(np.float64)
     for target in geometry.blend_shape_targets:

@@ -25,6 +25,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Undo `register`."""
+    """Remove the pages from Blender's Online Manual, if they were registered."""
     if native.website():
         bpy.utils.unregister_manual_map(pages)

@@ -138,7 +138,11 @@ class PlacesClip(FaceOperator):
         return [say("{count} controls were brought to rest.", count=count)]
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """Settings of the layer that plays the clip. Args: context  has the frame rate."""
+        """Settings of the layer that plays the clip; empty unless a subclass overrides this.
+
+        Args:
+            context: context with the scene, which has the frame rate.
+        """
         return {}
 
     def _report_on(self, made: clip_actions.Report, notes: list[str]) -> None:

@@ -146,7 +146,8 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     def _step(
         self, context: Context, job: Generator[float, None, list[str]], seconds: float
     ) -> bool:
-        """Bake for a number of seconds. Returns whether baking has ended."""
+        """Bake for a number of seconds. Returns whether baking has ended, also by an error, which
+        is reported; self._result is then the operator's result."""
         end = time.monotonic() + seconds
         self._result: Result = {"FINISHED"}
         try:
@@ -179,8 +180,8 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
     bl_idname = "risorius.unbake"
     bl_label = "Back to Live"
     bl_description = (
-        "Let the controls move the selected faces again. Baked actions are removed, "
-        "except actions that you protected or use elsewhere"
+        "Let the controls move the selected faces again. Baked actions are removed, except "
+        "actions that you edited, gave a fake user, or use elsewhere"
     )
 
     @classmethod

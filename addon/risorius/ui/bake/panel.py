@@ -33,7 +33,8 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
 
 
 def draw_late(layout: UILayout, rig: ArmatureObject) -> None:
-    """Draw warnings about a face that is evaluated a frame late or does not follow its controls.
+    """Draw warnings about a face that is evaluated a frame late, does not follow its controls, or
+    has simulations that an older version baked a frame late.
 
     Args:
         layout: layout of the panel.

@@ -144,7 +144,10 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         return {"FINISHED"}
 
     def _exchange(self, context: Context, rig: ArmatureObject, kind: str) -> int:
-        """Replace the existing board by a board of another kind, and convert pose and keyframes."""
+        """Replace the existing board by a board of another kind, and convert pose and keyframes.
+
+        Returns the number of handles of the new board.
+        """
         done = board_keys.exchange(context, rig, kind)
         lost = board_keys.lost(done.loss)
         if lost is not None:

@@ -61,7 +61,11 @@ _users: set[str] = session.keep("drawing.users", set, ("unregister",))
 
 
 def start(user: str) -> None:
-    """Start drawing for an operator. Args: user  name of the operator, also passed to `end`."""
+    """Start drawing for an operator.
+
+    Args:
+        user: name of the operator, with which it later calls `end`.
+    """
     _users.add(user)
     if not _handles:
         view = bpy.types.SpaceView3D
@@ -70,13 +74,22 @@ def start(user: str) -> None:
 
 
 def show(context: Context, shown: Shown) -> None:
-    """Set the drawing. Args: context  context with the views to redraw; shown  the new drawing."""
+    """Set the drawing, and redraw all 3D views.
+
+    Args:
+        context: context with the window manager.
+        shown: the new drawing.
+    """
     _shown.now = shown
     tag(context)
 
 
 def tag(context: Context) -> None:
-    """Redraw all 3D views. Args: context has the window manager."""
+    """Redraw all 3D views of all windows.
+
+    Args:
+        context: context with the window manager.
+    """
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -84,7 +97,12 @@ def tag(context: Context) -> None:
 
 
 def end(context: Context, user: str) -> None:
-    """Stop drawing for an operator. Args: context  context with the views; user  as in `start`."""
+    """Clear the drawing; remove the draw handlers after the last operator.
+
+    Args:
+        context: context with the window manager.
+        user: name of the operator that stops.
+    """
     _users.discard(user)
     if not _users:
         stop()
@@ -106,7 +124,8 @@ def is_drawing() -> bool:
 def colours_of(far: Float) -> Float32:
     """The colours of vertices, float32[V, 4]; the vertex that moves farthest is the most opaque.
 
-    Args: far  float64[V], distance that each vertex moves.
+    Args:
+        far: float64[V], distance that each vertex moves.
     """
     most = float(far.max(initial=0.0))
     share = np.clip(far / most, 0.0, 1.0) if most > 0 else np.zeros(len(far))

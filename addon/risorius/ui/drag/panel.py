@@ -11,7 +11,12 @@ from . import pointing, properties, tool
 
 
 def draw_button(layout: UILayout, context: Context) -> None:
-    """Draw the button of the drag tool and its options. Args: layout, context  of the panel."""
+    """Draw the button of the drag tool, and a button that opens its options.
+
+    Args:
+        layout: layout of the panel.
+        context: context of the panel.
+    """
     row = layout.row(align=True)
     row.operator("risorius.drag_tool", icon="VIEW_PAN", depress=tool.is_active(context))
     row.popover(panel="RISORIUS_PT_drag", text="", icon="DOWNARROW_HLT")

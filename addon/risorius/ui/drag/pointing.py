@@ -18,7 +18,11 @@ _NEAR = 9  # distance from a handle in pixels, at interface scale 1, within whic
 
 
 def counts_of(live: runtime.Runtime) -> list[int]:
-    """The number of vertices of each mesh in a face's DNA. Args: live  Runtime of the face."""
+    """The number of vertices of each mesh in a face's DNA.
+
+    Args:
+        live: Runtime of the face.
+    """
     return [len(mesh.positions) for mesh in live.dna.meshes]
 
 
@@ -52,7 +56,13 @@ def pick(context: Context, where: view.View, event: bpy.types.Event) -> picking.
 
 
 def pins_of(context: Context, rig: ArmatureObject, live: runtime.Runtime) -> list[drawing.Mark]:
-    """The pins of a face as marks. Args: context, rig, live  of the face."""
+    """The pins of a face as marks; none if the face has lost its control armature.
+
+    Args:
+        context: context with the visible scene.
+        rig: deforming armature of the face.
+        live: Runtime of the face.
+    """
     if parts.controls_of(rig) is None:
         return []
     points = kept_points.of(rig, kept_points.PINS, counts_of(live))
@@ -63,7 +73,12 @@ def pins_of(context: Context, rig: ArmatureObject, live: runtime.Runtime) -> lis
 def marks_of(context: Context, rig: ArmatureObject) -> list[drawing.Mark]:
     """The handles and pins of a face as marks.
 
-    Args: context, rig  context and armature of the face.
+    A face that is baked, or has lost its control armature or its DNA, has none. Handles are left
+    out if the setting Show Handles is off.
+
+    Args:
+        context: context with the visible scene.
+        rig: deforming armature of the face.
     """
     live = runtime.of(rig)
     if live is None or parts.controls_of(rig) is None or parts.BAKED in rig:
@@ -78,7 +93,12 @@ def marks_of(context: Context, rig: ArmatureObject) -> list[drawing.Mark]:
 
 
 def skin_of(context: Context, rig: ArmatureObject) -> Skin:
-    """The skin of a face at the visible level of detail. Args: context, rig  of the face."""
+    """The skin of a face at the visible level of detail.
+
+    Args:
+        context: context with the visible scene.
+        rig: deforming armature of the face.
+    """
     return Skin.of(context, rig, runtime.there(rig))
 
 

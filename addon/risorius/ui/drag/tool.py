@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The drag tool of the 3D view's toolbar: while it is active, a press on the skin starts a drag.
 
-All other shortcuts of Blender stay the same. While the tool is active, it draws the handles and
-pins of the active face, and the point under the cursor.
+The tool also has Shift-click (pins, and selection of handles), Alt-click (Blender's selection), and
+I, H and Alt-H for handles. All other shortcuts of Blender stay the same. While the tool is active,
+it draws the handles and pins of the active face, and the point under the cursor.
 """
 
 from typing import cast
@@ -164,7 +165,8 @@ def _draw() -> None:
 def register() -> None:
     """Add the tool to the toolbars of object mode and pose mode."""
     for cls in (DragInObjectMode, DragInPoseMode):
-        bpy.utils.register_tool(cls, separator=True)  # "after" fails in 4.3 and 4.5
+        # The argument `after` would set the place in the toolbar, but fails in Blender 4.3 and 4.5.
+        bpy.utils.register_tool(cls, separator=True)
     if not _handles:
         draw_over = bpy.types.SpaceView3D.draw_handler_add
         _handles.append(draw_over(_draw, (), "WINDOW", "POST_PIXEL"))

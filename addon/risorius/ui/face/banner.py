@@ -43,7 +43,7 @@ class Mode:
 
 
 def modes(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> list[Mode]:
-    """The active modes; modes that change most edits come first.
+    """The active modes: first modes that change the effect of edits, then modes of the view.
 
     Args:
         context: context with the current frame.

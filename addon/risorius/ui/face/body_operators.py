@@ -28,15 +28,25 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
 
     body: bpy.props.StringProperty(name="Body", description="The body's armature")
     base: bpy.props.StringProperty(
-        name="Base", description="Bone that moves the whole face; empty: find the bone by name"
+        name="Base",
+        description=(
+            "Bone that moves the whole face; empty: the bone Neck, or else the bone "
+            "Head. If all three bones are empty, they are found by name"
+        ),
     )
     neck: bpy.props.StringProperty(
         name="Neck",
-        description="Bone that turns the neck of the face; empty: find the bone by name",
+        description=(
+            "Bone that turns the neck of the face; empty: none. If all three bones are "
+            "empty, they are found by name"
+        ),
     )
     head: bpy.props.StringProperty(
         name="Head",
-        description="Bone that turns the head of the face; empty: find the bone by name",
+        description=(
+            "Bone that turns the head of the face; empty: none. If all three bones are "
+            "empty, they are found by name"
+        ),
     )
     fit: bpy.props.EnumProperty(
         name="Place",

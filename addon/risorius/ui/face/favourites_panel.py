@@ -32,7 +32,12 @@ class RISORIUS_PT_favourites(FaceOnlyPanel, Panel):
 
 
 def draw_button_menu(self: Menu, context: Context) -> None:
-    """Add entries to a slider's context menu. Args: self  the menu, context  of the menu."""
+    """Add entries to a slider's context menu.
+
+    Args:
+        self: the context menu of any button; without a slider under the mouse it stays unchanged.
+        context: context of the menu.
+    """
     name = control_under_mouse(context) if active_controls(context) is not None else ""
     if not name:
         return

@@ -26,9 +26,9 @@ def frame(context: Context, rig: ArmatureObject) -> None:
     """Frame a face in the 3D views of the user's window.
 
     A perspective view that is more than 40 degrees off the front rotates to a three-quarter view.
-    Views through a camera do not change, nor views that already show the face well. A solid view
-    with Blender's default material colours switches to texture colours, which show iris, lips and
-    brows. Undo does not restore views.
+    Views through a camera do not change, nor views locked to an object or the 3D cursor, nor views
+    that already show the face well. A solid view with Blender's default material colours switches
+    to texture colours, which show iris, lips and brows. Undo does not restore views.
 
     Args:
         context: context of Blender; without a window nothing happens.

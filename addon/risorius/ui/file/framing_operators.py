@@ -44,7 +44,8 @@ class RISORIUS_OT_frame_face(FaceOperator, Operator):
 
 
 def _only_outlines(context: Context) -> bool:
-    """Whether only control bones or armatures of a face are selected."""
+    """Whether at least one control bone or armature of the active face is selected, and nothing
+    else."""
     rig = face_rig(context)
     controls = parts.controls_of(rig)
     if context.mode == "POSE":

@@ -38,7 +38,8 @@ def import_character(
     options: build.BuildOptions,
     show: bool = False,
 ) -> Result:
-    """Build a character from a DNA file, and report warnings or the error.
+    """Build a character from a DNA file beside the scene's other faces, and report the result with
+    at most five warnings, or the error.
 
     Args:
         operator: operator that reports.
@@ -112,13 +113,14 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
     use_textures: bpy.props.BoolProperty(
         name="Textures",
         description=(
-            "Load textures from the folder of the DNA file, and pack them into the .blend file"
+            "Load textures from Texture Folder, or from beside the DNA file, and pack them "
+            "into the .blend file"
         ),
         default=True,
     )
     texture_folder: bpy.props.StringProperty(
         name="Texture Folder",
-        description="Folder of textures with MetaHuman names; empty: the folder of the DNA file",
+        description="Folder of textures with MetaHuman names; empty: search beside the DNA file",
         subtype="DIR_PATH",
     )
     use_simple_materials: bpy.props.BoolProperty(

@@ -22,7 +22,8 @@ SCENE_CAMERA = bpy.props.BoolProperty(
 
 
 def add_studio(by: Operator, context: Context, scene_camera: bool) -> None:
-    """Build a studio around the active face, and report it and changes of the scene's camera.
+    """Build a studio around the active face, and report it, a change of the scene's camera, and a
+    marker that changes the camera later.
 
     Args:
         by: operator that reports.

@@ -13,7 +13,7 @@ from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls
 
 
-def _preferences(context: Context) -> Any:  # noqa: ANN401  the class lies in a room above
+def _preferences(context: Context) -> Any:  # noqa: ANN401  importing the class would be circular
     addon = context.preferences.addons.get(native.ADDON)
     return addon.preferences if addon is not None else None
 

@@ -21,12 +21,16 @@ from .base import HandOperator
 from .favourites import favourites_of
 
 _REACH = 0.3  # share of the window's width that brings the factor from its start value to 1
-_AROUND = 12  # frames before and after the current one
-_NONE = 0.5  # factor of a breakdown in the middle
+_AROUND = 12  # frames from the current frame to the first and to the last frame of a proposed tweak
+_NONE = 0.5  # start factor of a breakdown: half way between the pose before and the pose after
 
 
 def control_under_mouse(context: Context) -> str:
-    """The slider under the mouse, or "". Args: context  context of a key or a menu."""
+    """The slider of the active face under the mouse, or "".
+
+    Args:
+        context: context of a shortcut or of a button's context menu.
+    """
     found = getattr(context, "property", None)
     if found is None or found[0] != parts.controls_of(face_rig(context)):
         return ""
@@ -54,7 +58,7 @@ class RISORIUS_OT_next_key(FaceOperator, Operator):
     )
     region: bpy.props.StringProperty(
         name="Region",
-        description="Region to change; empty: all regions",
+        description="Region whose next key is found; empty: the whole face",
         options={"SKIP_SAVE"},
     )
 

@@ -71,7 +71,12 @@ class RISORIUS_OT_shortcut(Operator):
 
 
 def draw_preferences(layout: UILayout, context: Context) -> None:
-    """Draw the shortcut of the pie menu. Args: layout, context  of the preferences."""
+    """Draw the button that adds or removes the shortcut of the pie menu, and the shortcut.
+
+    Args:
+        layout: layout of the preferences.
+        context: context of the preferences.
+    """
     row, item = layout.row(), shortcut(context)
     row.operator("risorius.shortcut", icon="EVENT_F", depress=item is not None)
     if item is not None:

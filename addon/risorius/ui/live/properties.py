@@ -97,7 +97,7 @@ def choices(context: Context) -> RISORIUS_PG_live:
 
 
 def settings_of(context: Context) -> sessions.Settings:
-    """The settings as the class with which scene/live/sessions.py starts a capture."""
+    """The user's settings as an object for a capture; an empty mapping becomes "arkit"."""
     chosen = choices(context)
     return sessions.Settings(
         chosen.source,

@@ -71,10 +71,14 @@ def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
 
 
 def draw_header(self: Menu, context: Context) -> None:
-    """Draw the menu's name in the header. Args: self, context  of the header's menus.
+    """Draw the menu Face in the header, in object mode and pose mode.
 
     Blender's search also uses the names of the menus that contain an entry, so the name of the
     add-on finds every command.
+
+    Args:
+        self: the menu with the header's menus.
+        context: context with the mode.
     """
     if context.mode in _MODES:
         text = words.say("Face (Risorius)")

@@ -46,7 +46,17 @@ def _not_mixed(own: Mapping[str, str]) -> list[str]:
 
 
 def _add(operator: Operator, context: Context, paths: list[str]) -> Result:
-    """Add faces to the mix; faces that do not match are reported and left out."""
+    """Add faces to the mix; faces that cannot be read or do not match its first face are reported
+    and left out, and so are, without a report, faces that it has already.
+
+    Args:
+        operator: operator that reports.
+        context: context of Blender.
+        paths: paths of DNA files.
+
+    Returns:
+        {"CANCELLED"} if no face was added.
+    """
     chosen = choices(context)
     added = 0
     for path in paths:

@@ -90,6 +90,8 @@ def shares_of(context: Context) -> tuple[list[float], dict[str, dict[int, float]
 def follow(context: Context) -> None:
     """Update the preview, if it exists, to the shares of the sliders.
 
+    The preview stays unchanged while all shares are 0, and is removed if a file cannot be read.
+
     Args:
         context: context of Blender.
     """

@@ -47,7 +47,8 @@ def stop() -> None:
 
 
 class _Pen:
-    """Draws boxes, lines and text at pixels of the region; text grows with the interface scale."""
+    """Draws boxes, lines and text; text grows with the interface scale. Places are pixels from the
+    lower left corner of the region."""
 
     def __init__(self, context: Context) -> None:
         self.scale: float = context.preferences.system.ui_scale
@@ -162,7 +163,8 @@ def _draw_look(pen: _Pen, sentence: str, x: float, y: float) -> float:
 
 
 def _draw_graph(pen: _Pen, context: Context, rig: ArmatureObject, x: float, y: float) -> None:
-    """Draw the chosen control on the left, and the correctives that depend on it on the right."""
+    """Draw the chosen control on the left, and on the right the first nine correctives that depend
+    on it, with the number of the others."""
     label, now = choices(context).control, present.of(rig)
     control = causes.control_of(rig, label)
     if control < 0 or now is None:

@@ -29,13 +29,13 @@ class RISORIUS_OT_why_vertex(FaceOperator, Operator):
 
     mesh: bpy.props.IntProperty(
         name="Mesh",
-        description="Number of the mesh in the DNA file; -1: the active mesh",
+        description="Number of the mesh in the DNA file, from 0; -1: the active mesh",
         default=-1,
         min=-1,
     )
     vertex: bpy.props.IntProperty(
         name="Vertex",
-        description="Number of the vertex; -1: the first selected vertex",
+        description="Number of the vertex in the mesh, from 0; -1: the first selected vertex",
         default=-1,
         min=-1,
     )
@@ -131,7 +131,8 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
 
 
 def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int, int] | None:
-    """The face under the cursor: armature, index of the mesh in the DNA file, index of the vertex.
+    """The face under the cursor: armature, index of the mesh in the DNA file, index of the vertex
+    nearest to the cursor.
 
     Args:
         context: context of Blender.

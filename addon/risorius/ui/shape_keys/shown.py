@@ -15,7 +15,11 @@ from .. import words
 
 
 def active_key(item: MeshObject) -> str:
-    """The name of the active shape key. Args: item  mesh object with shape keys."""
+    """The name of the active shape key.
+
+    Args:
+        item: mesh object with shape keys.
+    """
     keys = parts.keys_there(item).key_blocks
     return keys[min(item.active_shape_key_index or 0, len(keys) - 1)].name
 
@@ -35,7 +39,11 @@ def tooltip_of_choice(choice: assigned.Choice) -> str:
 
 
 def becomes(row: assigned.Row) -> str:
-    """The assignment of a shape key in a few words. Args: row  from assigned.of."""
+    """The assignment of a shape key in a few words, in the user's language.
+
+    Args:
+        row: row of the shape key, from assigned.of.
+    """
     if row.kind == assigned.EXPRESSION:
         own = _expressions().get(row.expression)
         label = words.say(own.label) if own is not None else row.expression
@@ -52,7 +60,11 @@ def becomes(row: assigned.Row) -> str:
 
 
 def who_knows(row: assigned.Row) -> str:
-    """A sentence about the source of an assignment. Args: row  from assigned.of."""
+    """A sentence about the source of an assignment, or about the shape key that has the control.
+
+    Args:
+        row: row of the shape key, from assigned.of.
+    """
     if row.holder:
         return words.say(
             (
@@ -85,7 +97,11 @@ def words_of_controls(controls: tuple[str, ...]) -> str:
 
 
 def words_of_value(value: str) -> str:
-    """A choice in a few words. Args: value  value of an assigned.Choice, "" for left out."""
+    """A choice in a few words, in the user's language.
+
+    Args:
+        value: value of an assigned.Choice; "" means left out; an unknown value is returned.
+    """
     if not value:
         return words.say("Left out")
     choice = next((c for c in assigned.choices() if c.value == value), None)
@@ -93,7 +109,11 @@ def words_of_value(value: str) -> str:
 
 
 def value_of(row: assigned.Row) -> assigned.Said:
-    """A shape key's assignment as a file of assignments stores it. Args: row  from assigned.of."""
+    """A shape key's assignment as a file of assignments stores it.
+
+    Args:
+        row: row of the shape key, from assigned.of.
+    """
     if row.expression:
         return f"@{row.expression}"
     return row.controls[0] if len(row.controls) == 1 else list(row.controls)

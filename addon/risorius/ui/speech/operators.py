@@ -42,7 +42,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     )
     transcript: bpy.props.StringProperty(
         name="Transcript",
-        description=("Spoken words in English; empty: recognise the words in the sound"),
+        description="Spoken words in English; empty: recognise the sounds without the words",
     )
     transcript_text: bpy.props.StringProperty(
         name="Text", description="A text of this file that holds the transcript"
@@ -182,7 +182,8 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     def layer_settings(self, context: Context) -> dict[str, object]:
         """Settings of a voice's layer, which moves the face only during the sound.
 
-        Args: context  has the frame rate.
+        Args:
+            context: context with the scene, which has the frame rate.
         """
         fade = round(_FADE * clip_actions.frame_rate(context.scene))
         return {"extend": "NOTHING", "fade_in": float(fade), "fade_out": float(fade)}

@@ -47,7 +47,11 @@ class RISORIUS_OT_make_override(Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     shapes: bpy.props.EnumProperty(
-        name="Shapes", description="Mode of the face's shapes", items=SHAPES
+        name="Shapes",
+        description=(
+            "Source of the face's shapes: the library file, or copies of the meshes in this file"
+        ),
+        items=SHAPES,
     )
 
     @classmethod

@@ -50,7 +50,7 @@ class Clip:
             NaN, -0 and denormals.
         rate: frames per second. For a clip with individual times, the rate that tools should
             propose.
-        start: seconds, the time of the first frame.
+        start: seconds, the time of the first frame; equal to times[0] if there are times.
         times: float64[frames] in seconds, strictly ascending, or None: then frame i is at start + i
             / rate.
         events: events in the order of their times.
@@ -71,8 +71,8 @@ class Clip:
         """Copy the arguments, which the class describes.
 
         Raises:
-            ValueError: a repeated name, a wrong shape, a rate that is not above 0, or times that do
-                not ascend.
+            ValueError: a repeated name, a wrong shape, a rate that is not above 0, a start that is
+                not finite, or times that are not finite or do not ascend.
         """
         self.names: tuple[str, ...] = tuple(names)
         self.curves: Floats = _frozen(np.array(curves, np.float32, order="C"))
@@ -196,7 +196,8 @@ class Clip:
         time nearest to its last frame.
 
         Raises:
-            BudgetError: too many frames, see resampled().
+            BudgetError: long gaps between frames would give more frames than the memory budget for
+                a clip of this size allows.
         """
         count = self._even_count(self.rate, 0.5)
         start = float(self.frame_times()[0]) if self.frame_count else self.start
@@ -295,8 +296,9 @@ class Clip:
             controls: names of the curves to read, in the wanted order; None for all.
 
         Raises:
-            ClipError: not a .rzc file, truncated, damaged or of another version, or it cannot be
-                opened.
+            ClipError: not a .rzc file, truncated, damaged or of another version, it cannot be
+                opened, it lacks some of the frames, or they are more than one read of a file of
+                this size may return.
             KeyError: the file lacks a control.
         """
         return ClipReader(source).read(frames, controls)
@@ -336,7 +338,8 @@ class ClipReader:
         byte_count: bytes of the file that belong to the clip; fewer than the file's size only after
             a recovery.
         block_starts: index of the first frame of each block, and at the end the frame count.
-        events, metadata: events of the clip and facts about it, see Clip.
+        events: events of the whole clip, in the file's order.
+        metadata: facts about the clip, such as source, take and actor.
     """
 
     def __init__(self, source: str | os.PathLike[str] | bytes, *, recover: bool = False) -> None:

@@ -36,7 +36,12 @@ class ClipWriter:
         """Open a file for recording.
 
         Args:
+            path: path of the .rzc file after close().
+            names: names of the controls, each once.
+            rate: frames per second, above 0.
+            start: seconds, the time of the first frame.
             has_times: True: each frame has its own time.
+            metadata: facts about the clip, such as source, take and actor.
             block_frames: 1 to 4096. Small blocks lose less in a crash; large blocks take less
                 space.
 

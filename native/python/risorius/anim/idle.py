@@ -252,6 +252,10 @@ def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
 
     The lid closes fast and opens ever more slowly. `blink.late`, the delay of the right lid, is not
     added.
+
+    Args:
+        blink: the blink.
+        times: seconds on the clock of blink.start.
     """
     t = np.asarray(times, np.float64) - blink.start
     up = np.clip((t - blink.close - blink.hold) / blink.open, 0.0, 1.0)
@@ -295,7 +299,7 @@ def make_saccades(seed: int, length: float, life: Life, loop: bool) -> list[Sacc
         seed: 0 or more; the same seed gives the same saccades.
         length: seconds to fill.
         life: range of the gaze; a gaze of 0 gives no saccades.
-        loop: True: the last saccade ends at the direction in which the first one starts.
+        loop: True: the last saccade ends where the first one starts, straight ahead.
     """
     if life.gaze == 0.0:
         return []
@@ -404,8 +408,9 @@ def _raised(noise: Doubles) -> Doubles:
 
 
 def _noise(dice: _Dice, times: Doubles, step: float, loop: bool) -> Doubles:
-    """Slow noise in [-1, 1]: a random cubic B-spline with one point in each `step` seconds, plus a
-    quarter of a faster one. Periodic only if `loop` is True."""
+    """Slow noise in [-1, 1]: four fifths of a random cubic B-spline with a point every `step`
+    seconds, plus one fifth of a spline with a point every 0.36 * `step` seconds. Periodic only if
+    `loop` is True."""
     return 0.8 * _spline(dice, times, step, loop) + 0.2 * _spline(dice, times, 0.36 * step, loop)
 
 

@@ -38,8 +38,9 @@ class Layer:
             adds weight * value (Blender: Add), "max" blends to the higher of both values.
         weight: a number in [0, 1]; or (times, weights), linear between these times and constant
             outside.
-        mask: {region, control or pattern: weight}, see regions.mask; or float[controls] in [0, 1];
-            None for all controls. Controls without a curve in the source never change.
+        mask: {region, control or pattern: weight}, where controls that no entry names have weight 0
+            (regions.mask lists the kinds of entry); or float[controls] in [0, 1]; None for all
+            controls. Controls without a curve in the source never change.
         start: scene time at which the clip (or its clip_range) or the pose starts. None: a clip
             starts at its own start time, and a pose is active at all times before its end.
         end: scene time at which a pose ends; the end of a clip follows from its length, scale and
@@ -120,7 +121,7 @@ class Mixer:
             names: names of the controls, e.g. Rig.raw_control_names; each once.
             layers: layers, the lowest first.
             ranges: limits of the values, {name: (low, high)} or float[names, 2]. Default: [0, 1],
-                and no limits for rotations of head and eyes ("head.yaw" ...).
+                and no limits for rotations of head, neck and eyes ("head.yaw" ...).
             exclusives: rules of controls that exclude each other: None, "default", the path of a
                 TOML file such as risorius/anim/exclusives.toml, or the result of load_exclusives.
             reactions: available reactions; by default load_reactions().
@@ -161,6 +162,9 @@ class Mixer:
         Args:
             source: a layer, or the source of a new layer.
             settings: fields of Layer.
+
+        Raises:
+            ValueError: an invalid layer, which is not added.
         """
         layer = source if isinstance(source, Layer) else Layer(source)
         self.layers = (*self.layers, replace(layer, **settings))
@@ -172,6 +176,9 @@ class Mixer:
         Args:
             place: index of the layer, from 0 at the bottom.
             settings: fields of Layer.
+
+        Raises:
+            ValueError: an invalid setting; the layer keeps its settings.
         """
         layers = list(self.layers)
         layers[place] = replace(layers[place], **settings)

@@ -100,6 +100,7 @@ def load_reactions(path: str | os.PathLike[str] | None = None) -> dict[str, Reac
     """Reactions by name, from a file such as risorius/anim/reactions.toml, which is the default.
 
     Raises:
+        OSError: the file cannot be read.
         ValueError: invalid file; the message names the file, the value found and the one expected.
     """
     table, where = _read(path, "reactions.toml")
@@ -112,6 +113,7 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
     """Rules from a file such as risorius/anim/exclusives.toml, which is the default.
 
     Raises:
+        OSError: the file cannot be read.
         ValueError: invalid file; the message names the file, the value found and the one expected.
     """
     table, where = _read(path, "exclusives.toml")

@@ -14,9 +14,10 @@ from ..author.heads.parts import HeadPart
 
 _LEAST = 12  # smallest number of vertices of a sphere
 _MOST = 400  # meshes with more islands, such as hair, are skipped
-_LARGE = 0.3  # of the longest side of all meshes: larger islands are no eyes
-_ALIKE = 0.1  # of the radius: largest difference of both radii of a pair
-_APART = (2.0, 9.0)  # radii from one eye of a pair to the other
+# Size of an island / longest side of the box around all meshes; larger islands are no eyes.
+_LARGE = 0.3
+_ALIKE = 0.1  # largest difference of both radii of a pair, as a fraction of the larger radius
+_APART = (2.0, 9.0)  # least and largest distance of the centres of a pair, in larger radii
 
 
 def paired_balls(parts: Sequence[HeadPart]) -> list[Doubles]:

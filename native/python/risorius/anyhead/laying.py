@@ -88,7 +88,7 @@ def lay_surface(
         Stopped: `progress` returned False.
     """
     if np.array_equal(template.triangles, target.triangles):
-        jaw = jaw_change(template, target.points, target, found.pose)
+        jaw = jaw_change(template, target.points, target, found.pose, found.error)
         return Laid(target.points, np.ones(len(target.points)), None, jaw)
     hints = Hints(name, up=np.eye(3)[1], front=np.eye(3)[2])
     own = find_form(template, hints, telling(progress, 0.0, _FOUND))
@@ -99,7 +99,8 @@ def lay_surface(
         laid = register(template, target, pairs, options, start, _rest(progress))
     except StoppedError:
         raise Stopped from None
-    jaw = jaw_change(template, laid.points, template, own.pose)
+    error = max(own.error, found.error)
+    jaw = jaw_change(template, laid.points, template, own.pose, error)
     return Laid(laid.points, laid.trusted.astype(np.float64), laid, jaw)
 
 

@@ -164,7 +164,8 @@ def _mended(
     progress: Progress | None,
     tell: Say,
 ) -> SparseShapes[Pose]:
-    """The displacements of the poses, repaired unless the options forbid it."""
+    """The displacements of the poses, repaired unless the options forbid it or the strength is
+    0."""
     if not o.repaired or not o.strength:
         return ways
     tell("repairing contacts of lids, lips, eyes and teeth")

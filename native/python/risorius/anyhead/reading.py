@@ -28,7 +28,8 @@ def read_head(path: Path) -> tuple[list[HeadPart], str]:
         path: an OBJ, glTF, GLB or FBX file, or a folder of OBJ files, one for each mesh.
 
     Raises:
-        AnyHeadError: the file is of another kind, or the folder has no OBJ files.
+        AnyHeadError: the file has a format that only Blender imports, or the folder has no OBJ
+            files.
         ShapeFileError: a file cannot be used.
         AnimationFileError: a file is damaged.
         OSError: a file cannot be read.

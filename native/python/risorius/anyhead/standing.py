@@ -22,8 +22,9 @@ from .landmarks.marks import LandmarkError, Landmarks
 from .surface import Surface
 from .telling import Progress
 
-_FLAT = 1e-3  # of the longest side
-_SNAP = 20.0  # degrees
+_FLAT = 1e-3  # smallest side of a head's bounding box, as a fraction of its longest side
+_SNAP = 20.0  # degrees: a head that leans less is turned by right angles only
+# kinds of meshes, see web.kinds, in which no face is searched
 _ASIDE = ("hair", "cloth", "lashes", "teeth", "tongue", "gum", "eyes", "wet")
 
 
@@ -64,8 +65,9 @@ def stand(
             False.
 
     Raises:
-        AnyHeadError: there are no polygons, or a value of `wishes` is invalid.
-        LandmarkError: no face was found, or landmarks are missing.
+        AnyHeadError: there are no polygons, a coordinate is not finite or too large, all vertices
+            are in one plane, or a value of `wishes` is invalid.
+        LandmarkError: no face was found, landmarks are missing, or the lips are joined.
         Stopped: `progress` returned False.
     """
     wrong = check_axes(wishes) or (check_unit(wishes.unit) if wishes.unit else "")

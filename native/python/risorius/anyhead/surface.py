@@ -15,7 +15,7 @@ from ..author.geometry.skeleton import Doubles, Ints
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles in any unit, y up, the face towards +z, the character's left at +x."""
+    """Triangles in any unit; functions state the direction of the head that they expect."""
 
     points: Doubles  # [V, 3]
     triangles: Ints  # [T, 3], counter-clockwise seen from outside

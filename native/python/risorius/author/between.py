@@ -21,12 +21,13 @@ class Ways:
     its source face.
 
     Attributes:
-        rest: float64[joints, 3], neutral positions of all joints.
+        rest: float64[joints, 3], neutral positions of the new face's joints.
         whole: float64[C, joints, 3, 4], motions of the new face's joints with each of C inputs at
             1, as matrices from positions in the rest pose to posed positions.
         made: control value of SHARES -> motions of the new face's joints, shaped as `whole`, with
             each input at this value.
-        before: control value of SHARES -> motions of the source's joints, float64[C, J, 3, 4].
+        before: control value of SHARES -> float64[C, J, 3, 4], motions of the source's J joints
+            with each input at this value.
         turning: bool[C], whether an input moves joints of the source.
         middles: index of an input in the C inputs -> float64[3], the pivot about which the input
             turns vertices; inputs without a pivot have no entry.
@@ -66,7 +67,7 @@ class Between:
         """The wanted displacements float64[V, 3] at each control value in `shares`.
 
         Args:
-            row: row of the expression.
+            row: index of the expression among the C inputs.
             wanted: float64[V, 3], its displacements at 1.
             shares: values of the control, some of SHARES.
         """
@@ -91,7 +92,7 @@ class Between:
         """The largest error of the joints at SHARES, in the file's unit.
 
         Args:
-            row: row of the expression.
+            row: index of the expression among the C inputs.
             wanted: float64[V, 3], its displacements at 1.
             skin: the mesh with its weights on the joints of the new face.
         """

@@ -99,6 +99,7 @@ def make_joint_rig(
         ValueError: the face has no mesh, a joint changes its size, every joint moves, no expression
             moves a blend shape of LOD 0, the LOD options are invalid, or the face has another
             topology than `like`.
+        BudgetError: the tables would be too large for the size of the face.
     """
     work, fit, made, regions = _made(dna, options or RigOptions(), progress, like)
     made.finish()

@@ -112,8 +112,9 @@ class Work:
     names: list[str]  # names of these inputs
     motions: Doubles  # [C, J, 3, 4] motions of the source's joints
     positions: Doubles  # [J, 3] neutral positions of the source's joints
-    head: int  # the joint that no expression moves with the largest weights on moved vertices
-    wanted: dict[int, Wanted] = field(default_factory=dict)  # by mesh, released early
+    head: int  # the joint that carries most of the motion, of the joints that no expression moves
+    # mesh -> its displacements; emptied before the fit, to free memory
+    wanted: dict[int, Wanted] = field(default_factory=dict)
     levels: int = 1
     new: list[Ints] = field(default_factory=list)  # indices of each level's new joints
     pivots: list[Pivot] = field(default_factory=list)

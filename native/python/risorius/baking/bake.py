@@ -41,8 +41,9 @@ def bake(
     """Evaluate every frame in bounded memory, and write the requested files atomically.
 
     Args:
-        clip: clip that is already resampled and cut, see `prepared`.
-        face, lod: the character, and the LOD from 0.
+        clip: clip that is already resampled and cut, a result of `prepared`.
+        face: the character, from `load_face`.
+        lod: the LOD, from 0.
         outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to write no file.
             Temporary files of killed processes in these folders are not deleted.
         parts: pose parts to write, some of PARTS.
@@ -51,8 +52,8 @@ def bake(
         progress: called with the number of finished frames.
 
     Returns:
-        The facts of Measure, such as the largest joint motion, and "evaluation_seconds", the time
-        inside the evaluator.
+        The facts of Measure, such as the largest joint translation, and "evaluation_seconds", the
+        time inside the evaluator; a .csv needs an earlier evaluation, which does not count.
 
     Raises:
         ValueError: the character lacks this LOD.

@@ -23,10 +23,9 @@ class Performance:
 
     Attributes:
         clip: curves of raw controls; the character may lack some of these controls.
-        mapping: name of the mapping that was used; "" if the file's curves are named like raw
-            controls, so that no mapping is needed.
+        mapping: name of the mapping that was used; "" for none.
         unmapped: names of the file's curves that are no raw controls and that the mapping does not
-            know.
+            know; empty for a .rzc file without a mapping, whose curves all stay.
     """
 
     clip: risorius.Clip

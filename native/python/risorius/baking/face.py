@@ -65,7 +65,8 @@ class Face:
     def rest(self, part: str) -> Floats:
         """The rest values of a part of the pose, one of PARTS.
 
-        The part "joints" has float32[joints, columns]; other parts have float32[n], one per name.
+        The part "joints" has float32[joints, columns], the difference from the neutral joint: 0,
+        but 1 for qw. Other parts have float32[n], one per name.
         """
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
@@ -144,6 +145,7 @@ def prepared(
 
     Raises:
         ValueError: no frame remains.
+        BudgetError: `rate` gives more frames than a clip of this size may have.
     """
     found = clip.frame_count
     if rate is not None:
@@ -200,7 +202,8 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of curves of `clip` that have no effect, because `face` has no such raw control."""
+    """The names of curves of `clip` that have no effect on `face`: they are neither raw controls of
+    it nor angles of a bone that it rotates by raw controls."""
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))

@@ -13,7 +13,8 @@ from .face import Chunk, Face, Floats, missing
 
 
 class Measure:
-    """Finds a clip's largest joint translation and active correctives, chunk by chunk."""
+    """Finds a clip's largest joint translation and active correctives, chunk by chunk, and the
+    ranges of its curves at the end."""
 
     def __init__(self, clip: risorius.Clip, face: Face) -> None:
         self.clip, self.face = clip, face

@@ -23,8 +23,11 @@ class Progress:
     ) -> None:
         """Start at `before` of `total` items.
 
-        Args: total: number of items. noun: name of the items, e.g. "jobs". before: number of items
-        done by an earlier run. stream: default is stderr.
+        Args:
+            total: number of items.
+            noun: name of the items, e.g. "jobs".
+            before: number of items that an earlier run has done.
+            stream: where to write; None for stderr.
         """
         self.total, self.noun = total, noun
         self.done = self._before = before

@@ -40,8 +40,12 @@ class NpzWriter:
     ) -> None:
         """Open the archive.
 
-        Args: file: binary file; beside: arrays that do not depend on frames, see about(); face: the
-        character; parts: parts to write; compress: True for a smaller file.
+        Args:
+            file: binary file, open for writing.
+            beside: arrays that do not depend on frames, from about().
+            face: the character, from `load_face`.
+            parts: parts to write, from PARTS.
+            compress: True for a smaller file.
         """
         self._beside = beside
         frames = len(beside["times"])
@@ -176,6 +180,7 @@ class CsvWriter:
 
     Args:
         file: binary file, open for writing.
+        face: the character, whose names become headings.
         times: float64[frames], seconds.
         moving: result of find_moving.
     """

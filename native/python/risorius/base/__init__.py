@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Tools that all packages use: errors, budgets, filters, TOML. Imports no other package."""
+"""Tools that all packages of risorius use: errors, budgets, filters, TOML. Imports none of them."""

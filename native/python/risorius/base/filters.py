@@ -49,8 +49,8 @@ class OneEuro:
         cutoff: cutoff frequency at speed 0, in Hz; may be changed between frames.
         beta: growth of the cutoff: Hz per (unit per second) of speed.
         speed_cutoff: cutoff frequency for the speed in Hz.
-        longest_gap: seconds between two frames; after a longer gap, or a step back in time, the
-            filter restarts.
+        longest_gap: seconds between two frames; after a gap of this length or longer, or a step
+            back in time, the filter restarts. None: it never restarts.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class OneEuro:
             cutoff: cutoff frequency at speed 0, in Hz, above 0.
             beta: growth of the cutoff with speed, 0 or more.
             speed_cutoff: cutoff for the speed in Hz, above 0.
-            longest_gap: seconds; None: the filter never restarts, and a frame that is not later
+            longest_gap: seconds; None: no gap restarts the filter, and a frame that is not later
                 than the last one returns the last values.
 
         Raises:
@@ -84,8 +84,8 @@ class OneEuro:
         """Filtered values of a frame.
 
         Args:
-            time: time in seconds; a time that is not later than the last one returns the last
-                values or restarts the filter, see longest_gap.
+            time: time in seconds. A repeated time returns the last values; so does an earlier time
+                if longest_gap is None, otherwise it restarts the filter.
             values: [controls]; a different number of controls restarts the filter.
 
         Returns:

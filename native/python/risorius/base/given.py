@@ -73,7 +73,8 @@ def finite(
 
 
 def whole_text(typed: str, low: int, high: int = MOST) -> int:
-    """Convert the text of an integer that a user typed, with the digits 0 to 9.
+    """Convert the text of an integer that a user typed: a sign or none, and at most 18 of the
+    digits 0 to 9.
 
     Args:
         typed: the text.
@@ -91,7 +92,7 @@ def whole_text(typed: str, low: int, high: int = MOST) -> int:
 def finite_text(
     typed: str, low: float = -LARGEST, high: float = LARGEST, *, above: bool = False
 ) -> float:
-    """Convert the text of a finite number that a user typed.
+    """Convert the text of a finite number that a user typed, in ASCII and without underscores.
 
     Args:
         typed: the text.
@@ -205,7 +206,7 @@ def _inside(value: float, found: object, low: float, high: float, *, above: bool
 
 
 def _range(value: float, low: float, high: float, above: bool = False) -> str:
-    """The expected range as text."""
+    """The expected range as text; if only one side has a limit, the side that `value` exceeds."""
     bounded = high < (MOST if isinstance(high, int) else LARGEST)
     if above and low == 0:
         return "more than 0" + (f", at most {_plain(high)}" if bounded else "")

@@ -14,7 +14,8 @@ _EVERY = 0.5  # seconds between two questions
 def patiently(work: Callable[[], T], go_on: Callable[[], object]) -> T:
     """The result of a function that runs in another thread; its exceptions are raised here.
 
-    If `go_on` raises an exception, the other thread ends by itself, and its result is lost.
+    If `go_on` raises an exception, it is raised here at once. The other thread cannot be stopped:
+    it runs to its end, and its result is lost.
 
     Args:
         work: the function; it must not change anything that the caller still uses after a stop.

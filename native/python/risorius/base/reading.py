@@ -64,7 +64,7 @@ def open_file(path: str | os.PathLike[str]) -> BufferedReader:
         path: path of the file.
 
     Raises:
-        ReadingError: the file is a device, which has no end.
+        ReadingError: the file is a character device, which has no end, and no terminal.
         OSError: the file cannot be read.
     """
     file = open(path, "rb")  # noqa: SIM115  the caller closes it
@@ -83,7 +83,7 @@ def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
         name: name of the stream for the error.
 
     Raises:
-        ReadingError: more bytes remain.
+        ReadingError: the rest is longer than `most`.
         OSError: the stream cannot be read.
     """
     pieces: list[bytes] = []
@@ -98,6 +98,9 @@ def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
 
 def require_regular(path: str | os.PathLike[str]) -> None:
     """Raise an error if a path that was found in a folder or file is a pipe, a socket or a device.
+
+    Args:
+        path: path of a file or a folder; a link is followed.
 
     Raises:
         ReadingError: the path is a pipe, a socket or a device.

@@ -134,7 +134,8 @@ def other_kind(data: bytes, own: Container[str] = ()) -> Kind | None:
 
 
 def ends_of(source: str | os.PathLike[str] | bytes) -> bytes:
-    """The start and the end of a file, enough for `kind_of`; empty if the path is no regular file.
+    """The start and the end of a file, enough for `kind_of`; empty if the path is no regular file
+    or cannot be read.
 
     Pipes are not opened: they can be read only once, and opening one might wait for ever.
     """

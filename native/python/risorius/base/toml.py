@@ -27,8 +27,11 @@ class TomlError(RisoriusError):
 def parse(text: str) -> dict[str, Any]:
     """Parse a TOML text into a table.
 
+    Args:
+        text: the text.
+
     Raises:
-        TomlError: not TOML, longer than MOST_BYTES, or nested deeper than DEEPEST.
+        TomlError: not TOML, more than MOST_BYTES characters, or nested deeper than DEEPEST.
     """
     if len(text) > MOST_BYTES:
         raise TomlError(f"at most {MOST_BYTES:,} characters were expected, found {len(text):,}")
@@ -47,7 +50,15 @@ def parse(text: str) -> dict[str, Any]:
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a TOML file into a table. Raises: ValueError with the file's name; OSError."""
+    """Read a TOML file into a table.
+
+    Args:
+        path: path of the file.
+
+    Raises:
+        ValueError: the file is invalid, too large or a device; the message names the file.
+        OSError: the file cannot be read.
+    """
     try:
         return parse(text_of(path))
     except TomlError as error:

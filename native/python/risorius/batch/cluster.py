@@ -57,7 +57,8 @@ class Cluster:
     def workers(self) -> dict[str, int]:
         """Address of each worker -> number of jobs that it runs at the same time.
 
-        Raises: PoolError.
+        Raises:
+            PoolError: the scheduler does not answer.
         """
         try:
             return dict(self._client.nthreads())
@@ -71,7 +72,7 @@ class Cluster:
         """Outcomes as they arrive. Closing the iterator early cancels jobs that have not begun.
 
         Raises:
-            PoolError: the scheduler does not answer.
+            PoolError: the scheduler does not answer, or has cancelled a job.
         """
         suspects: list[Job] = []
         try:

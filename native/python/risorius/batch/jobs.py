@@ -39,7 +39,16 @@ class JobsError(RisoriusError):
 
 @dataclass(frozen=True)
 class Options:
-    """Options that change the content of the outputs."""
+    """Options that change the content of the outputs.
+
+    Attributes:
+        parts: parts of the pose to write, from PARTS.
+        rate: frames per second to resample to; None: as in the clip.
+        frames: first and end (exclusive) of the frames after resampling; None: to the clip's end.
+        quaternions: True: rotations of joints are quaternions; False: Euler angles.
+        compress: True: the .npz is compressed.
+        mapping: the mapping of curves to controls.
+    """
 
     parts: tuple[str, ...] = DEFAULT_PARTS
     rate: float | None = None
@@ -66,7 +75,14 @@ class Job:
 
 @dataclass(frozen=True)
 class Plan:
-    """The content of a JOBS.toml, expanded to jobs."""
+    """The content of a JOBS.toml, expanded to jobs.
+
+    Attributes:
+        source: path of the JOBS.toml.
+        output: folder of the outputs and of the journal.
+        summary: paths of the summary's files, .csv or .json.
+        jobs: the jobs.
+    """
 
     source: Path
     output: Path
@@ -103,7 +119,7 @@ class _Table:
         Args:
             key: name of the key.
             expected: the expected value in words, for the error.
-            check: whether a value is valid.
+            check: function that says whether a value is valid.
             default: value of a missing key; None makes a missing key an error.
 
         Raises:
@@ -166,9 +182,14 @@ def _all_of(value: Any, kind: type) -> bool:
 def read_jobs(source: Path) -> Plan:
     """Read a JOBS.toml and find the clips and characters that it names.
 
+    Args:
+        source: path of the JOBS.toml; paths in it are relative to its folder.
+
     Raises:
-        JobsError: the file cannot be read, a key or value is invalid, a pattern matches nothing, or
-            two jobs would write one file.
+        JobsError: the file cannot be read, a key or value is invalid, a pattern matches nothing,
+            there are more than MAX_JOBS jobs, or a job would write a file of another job, an input
+            or a file outside the output folder.
+        ReadingError: the file is too large, or a device.
     """
     try:
         values = toml.parse(toml.text_of(source))
@@ -261,6 +282,11 @@ def _mapping(table: _Table, base: Path) -> str | None:
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:
     """The files that match the patterns in `key`, sorted by path.
+
+    Args:
+        table: the table with the key.
+        key: key of one pattern or a list of patterns.
+        base: folder to which the patterns are relative.
 
     Raises:
         JobsError: a pattern has no match, or two patterns match the same file.
@@ -362,7 +388,8 @@ def _refuse_collisions(plan: Plan) -> None:
     taken = {_folded(path): "the summary" for path in plan.summary}
     if len(taken) < len(plan.summary):
         raise JobsError(
-            f"{plan.source}: summary: different files were expected, found a file twice"
+            f"{plan.source}: summary: different files were expected in this list, found a "
+            "file twice"
         )
     taken[_folded(plan.source)] = "this file itself"
     taken[_folded(plan.journal)] = "the journal"

@@ -74,7 +74,10 @@ class Journal:
     def facts(self, name: str) -> dict[str, Any]:
         """The facts of a finished job.
 
-        Raises: OSError, KeyError; JobsError: its line is missing.
+        Raises:
+            KeyError: the journal has no such job.
+            OSError: the journal cannot be read.
+            JobsError: the file has other bytes at the place of the job's line.
         """
         record = _parsed(self._line_of(name))
         if not isinstance(record, dict) or not isinstance(record.get("facts"), dict):

@@ -14,9 +14,10 @@ class Outcome:
     Attributes:
         name: name of the job.
         error: the reason of the failure; "" if it succeeded.
-        stamp: hash of the job's inputs, see stamp().
-        facts: results of baking.Measure, and the seconds for reading, evaluating and writing.
-        attempts: number of workers that ran the job.
+        stamp: hash of everything that the outputs depend on, from work.stamp; "" after a failure.
+        facts: results of baking.bake, the mapping and the curves it left out, and the seconds for
+            loading and for the whole job.
+        attempts: number of processes of this run that got the job; 1 on a cluster.
     """
 
     name: str

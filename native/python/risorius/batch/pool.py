@@ -157,7 +157,8 @@ class Pool:
         Closing the iterator early, even by an exception, stops the workers.
 
         Raises:
-            PoolError: no worker can be started.
+            PoolError: workers end again and again before they have begun.
+            OSError: the system cannot start a process.
         """
         queue, left = _Queue(jobs), len(jobs)
         try:
@@ -210,7 +211,8 @@ class Pool:
         self._workers.append(_Worker(self._work))
 
     def _stop(self) -> None:
-        """Stop all workers, immediately if they have jobs; the caller deletes partial files."""
+        """Stop all workers, immediately if they have jobs or have not begun; the caller deletes
+        partial files."""
         for worker in self._workers:
             worker.connection.close()
             if worker.job is not None or not worker.ready:

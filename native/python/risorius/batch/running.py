@@ -27,7 +27,15 @@ from .work import run_job
 
 @dataclass
 class Report:
-    """The result of a batch."""
+    """The result of a batch.
+
+    Attributes:
+        plan: the jobs.
+        outcomes: job name -> outcome, without facts; a job that was not reached has none.
+        reused: names of the jobs that an earlier run had finished.
+        seconds: duration of this run.
+        frames: number of frames that this run evaluated in jobs without error.
+    """
 
     plan: Plan
     outcomes: dict[str, Outcome] = field(default_factory=dict)
@@ -84,7 +92,7 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
 
     Raises:
         LockedError: another batch works in the output folder.
-        PoolError: no worker can be started, or the cluster cannot be reached or is gone.
+        PoolError: workers end before they begin, or the cluster cannot be reached or is gone.
         OSError: the output folder cannot be written.
         KeyboardInterrupt: the workers were stopped; finished jobs are in the journal.
     """

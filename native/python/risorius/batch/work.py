@@ -112,7 +112,7 @@ def _performance(job: Job) -> Performance:
 
 
 def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
-    """Run a job; errors about its files become an Outcome.
+    """Run a job; OSError, ValueError and MemoryError become an Outcome, other errors are raised.
 
     Args:
         job: job whose paths exist on this machine.

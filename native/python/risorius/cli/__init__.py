@@ -2,7 +2,8 @@
 """The command line. This module prints the error that ends a command, as one sentence on the
 standard error.
 
-Exit codes: 0 success, 1 bad input, 2 bad command line, 130 interrupted.
+Exit codes: 0 success; 1 bad input, or a command found errors, differences, failed jobs or missing
+controls and reported them; 2 bad command line; 130 interrupted.
 """
 
 from __future__ import annotations

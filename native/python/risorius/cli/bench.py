@@ -76,10 +76,10 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
         folder: folder for the files.
 
     Returns:
-        The names of the files, in the order of FRAMES.
+        Paths of the files, one of float32 per array, in the order of FRAMES.
 
     Raises:
-        InputError: not an .npz, or an array is missing or has a wrong shape.
+        InputError: not an .npz, or an array is missing, has a wrong shape or fewer than 2 frames.
     """
     try:
         return _export_frames(source, raw_count, folder)

@@ -76,6 +76,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
     """Parse NAME=VALUE texts; full names of abbreviated controls are printed to stderr.
 
+    A name such as an ARKit unit, or a part of a name with both sides, may mean several controls.
+    Each of them gets the value times its weight.
+
     Args:
         texts: the texts as typed; for a repeated name the last value is used.
         names: names of all controls.
@@ -85,8 +88,8 @@ def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
         float32[names], all values.
 
     Raises:
-        CommandLineError: a text has another form, a name matches no control or several, or a value
-            is not a finite number.
+        CommandLineError: a text has another form, a name has no meaning or several meanings, or a
+            value is not a finite number.
     """
     index = {name: i for i, name in enumerate(names)}
     values = rest.copy()

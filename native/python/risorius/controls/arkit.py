@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads the raw controls of the 52 ARKit units, and their order in protocols, from arkit.toml."""
+"""Reads from arkit.toml the raw controls that each of the 52 ARKit units moves, and the order of
+the units in protocols."""
 
 from __future__ import annotations
 
@@ -43,6 +44,9 @@ def order(name: str) -> tuple[str, ...]:
 
     Args:
         name: name of the order: "live_link_face_take", "live_link_face_packet" or "face_cap".
+
+    Raises:
+        KeyError: another name.
     """
     table = _table()
     units = tuple(table["units"])

@@ -119,7 +119,14 @@ def _shapes_of_controls(dna: Dna) -> dict[int, str]:
 
 
 class ControlNames:
-    """Names of a file's controls, in the order: raw, correctives, networks' outputs, RBF poses."""
+    """Names of a file's controls, in the order: raw, correctives, networks' outputs, RBF poses.
+
+    Attributes:
+        names: the names; a corrective is called by its index and its first blend shape channel.
+        psd_begin: index of the first corrective.
+        psd_end: index after the last corrective, which is the first output of a network.
+        ml_end: index after the last output of a network, which is the first control of a pose.
+    """
 
     def __init__(self, dna: Dna) -> None:
         raw = dna.raw_control_names

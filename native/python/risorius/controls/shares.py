@@ -14,13 +14,14 @@ import numpy.typing as npt
 Numbers = TypeVar("Numbers", bound=npt.NDArray[np.floating[Any]])
 
 # Smaller values of the other control (such as jawOpen) count as LEAST in the division; otherwise
-# noise of a face at rest would make the fraction jump between 0 and 1. The error of the control's
-# value is at most LEAST / 4, which is 0.2 mm between the lips.
+# noise of a face at rest would make the fraction jump between 0 and 1. A rig that multiplies the
+# fraction by the other control's value then gets the control's value with an error of at most
+# LEAST / 4, which is 0.2 mm between the lips.
 LEAST = 0.02
 
 
 def share_of(part: Numbers, whole: Numbers) -> Numbers:
-    """The share `part` / `whole`, 0 to 1; 0 if both are 0.
+    """The share `part` / `whole`, clamped to [0, 1]; 0 if both are 0.
 
     Args:
         part: values of the control, in any shape.

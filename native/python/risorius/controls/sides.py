@@ -26,7 +26,7 @@ def mirrored_name(name: str) -> str:
 def name_across(name: str) -> str:
     """The same control on the other side: eyeLookLeftL gives eyeLookLeftR, the same direction.
 
-    A control of the whole face, such as jawLeft, gives itself.
+    A name without L or R at its end, such as jawLeft or eyeL.yaw, gives itself.
     """
     before, dot, last = name.rpartition(".")
     return before + dot + _on_the_other_side(last)

@@ -83,9 +83,12 @@ class Vocabulary:
     """The names that a program or protocol uses.
 
     Attributes:
-        name, title, description: identifier of the vocabulary, and texts for display.
+        name: identifier of the vocabulary.
+        title: its name for display.
+        description: a text for display.
         meanings: name in its usual spelling -> Meaning.
-        is_loose: True: letter case, "_" and the difference of Left and L at the end are ignored.
+        is_loose: True: letter case, separators such as "_" and the difference of Left and L at the
+            end are ignored.
     """
 
     def __init__(self, name: str, table: Mapping[str, Any]) -> None:
@@ -117,8 +120,8 @@ class Vocabulary:
         """A name in the vocabulary's spelling, or None if the vocabulary lacks it.
 
         Args:
-            name: a name; it may have any text before its last dot, and the vocabulary's prefixes
-                and suffixes.
+            name: a name; it may have the name of a mesh or figure before it, as in `parts_of`, and
+                the vocabulary's prefixes and suffixes.
             loosely: True: ignore differences in spelling, if the vocabulary allows this.
         """
         for candidate in self._candidates(name):
@@ -167,7 +170,8 @@ def find(name: str, order: Sequence[str] | None = None) -> Meaning | None:
     """The meaning of a name, or None if no vocabulary contains it.
 
     Args:
-        name: name of a shape or a curve; it may have any text before its last dot.
+        name: name of a shape or a curve; it may have the name of a mesh or figure before it, as in
+            `parts_of`.
         order: names of vocabularies, as returned by `leading`; the first that contains the name
             decides. None: ARKit in any spelling, then the exact spelling of any vocabulary, then
             any spelling.
@@ -190,7 +194,8 @@ def _found(name: str, order: Sequence[str], *, loosely: bool) -> Meaning | None:
 
 
 def known(given: Iterable[str]) -> dict[str, int]:
-    """Vocabulary -> number of the given names that it contains, if it contains any."""
+    """Vocabulary -> number of the given names that it contains in any spelling; vocabularies that
+    contain none are left out."""
     given = list(given)
     counts = {v.name: sum(v.spelled(n) is not None for n in given) for v in _all().values()}
     return {name: count for name, count in counts.items() if count}

@@ -13,7 +13,8 @@ from .regions import expand_sides
 def named_weights(
     table: Mapping[str, Any], prefix: str, where: str, lowest: float = 0.0, highest: float = 1.0
 ) -> dict[str, float]:
-    """{control: weight}; a name ending in * gives both sides; names without * have precedence.
+    """{control: weight}; a name ending in * gives both sides, one ending in ** the four quarters of
+    the lips. If several names give a control, the one with fewer * decides.
 
     Args:
         table: name -> weight, from a TOML file.

@@ -55,9 +55,9 @@ def explain(
         gui: float32[G], GUI controls from which `raw` was computed, or None.
 
     Returns:
-        A dict that json.dumps accepts. In the lists of active correctives, joints, blend shapes and
-        animated maps, the most important entry is first. The contributions to a joint sum to its
-        pose.
+        A dict that json.dumps accepts. Active correctives and blend shapes are sorted by value,
+        joints by movement, and animated maps by the difference from their rest, the largest first.
+        The contributions to a joint sum to its pose.
 
     Raises:
         ValueError: the rig uses quaternions, or controls or pose are not finite.

@@ -120,9 +120,13 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Active correctives; inactive ones with exactly one control that is not above 0; and ones that
-    are inactive although all their controls are above 0, because nothing reads them at this LOD or
-    because they depend on themselves.
+    """The correctives in groups.
+
+    Returns:
+        "count": the number of correctives. "fire": active ones. "lack_one": inactive ones of
+        several controls, of which exactly one is not above 0, if something reads them at this LOD.
+        "rest_at_this_lod": ones that are inactive although all their controls are above 0, because
+        nothing reads them at this LOD or because they depend on themselves.
 
     Args:
         dna: the face.
@@ -250,7 +254,8 @@ def _on(indices: Sequence[int], controls: Doubles, names: ControlNames) -> list[
 
 
 def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) -> list[Facts]:
-    """Twist and swing setups whose angle is not 0: their angles in degrees, and their joints.
+    """Twist and swing setups whose angle is not 0: their angles in degrees, and their joints. A
+    setup that does not have four input controls is left out.
 
     Args:
         dna: the face.
@@ -288,7 +293,7 @@ def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) ->
 
 
 def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
-    """Angles of a quaternion (x, y, z, w) in degrees: twist about an axis, and swing."""
+    """Angles of a quaternion (x, y, z, w) from 0 to 180 degrees: twist about an axis, and swing."""
     axis = min(axis, 2)
     about, w = float(q[axis]), float(q[3])
     rest = math.hypot(*(float(q[a]) for a in range(3) if a != axis))

@@ -15,7 +15,8 @@ from risorius import _native
 from ..controls.control_names import ControlNames, named
 from ..rigs.rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
 
-# Source of a contribution: index of a control, or name of a setup that combines several controls.
+# Source of a contribution: index of a control, or the name of a twist, of a swing, or "networks",
+# each of which combines several controls.
 Key = int | str
 Contributions = dict[int, dict[Key, Doubles]]
 """joint -> key -> float64[9]: tx ty tz rx ry rz sx sy sz in the file's units."""

@@ -18,7 +18,8 @@ def page(facts: Facts, top: int = 10) -> str:
 
     Args:
         facts: the result of explain().
-        top: largest number of lines per list; further entries are only counted.
+        top: largest number of lines per list, but at least 20 for the raw controls; further
+            entries are only counted.
     """
     sections = [
         _raw(facts, top),

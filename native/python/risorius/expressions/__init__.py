@@ -66,8 +66,9 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
     """Load expressions from a file or a folder.
 
     Args:
-        path: a TOML file, or a folder of TOML files (a library); None: Risorius' own expressions,
-            in the order of FILES.
+        path: a TOML file, or a folder of TOML files (a library), read in the order of their names;
+            None: Risorius' own expressions, in the order of FILES. If several files have a name,
+            the last one is used, with a warning.
 
     Raises:
         ValueError: an invalid file; the message names the file, the expression, the value found and
@@ -86,6 +87,9 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
 
 def of_text(text: str) -> dict[str, Expression]:
     """Read expressions from the text of a file.
+
+    Args:
+        text: text of a TOML file.
 
     Raises:
         ValueError: the text is invalid; the message says where.
@@ -134,7 +138,7 @@ def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.N
     """Convert an expression to raw controls of a rig.
 
     Args:
-        expression: an Expression, or the name of an expression that load() returns.
+        expression: an Expression, or the name of one of Risorius' own.
         rig_names: names of the rig's raw controls, Rig.raw_control_names.
 
     Returns:
@@ -153,7 +157,7 @@ def text_of(expression: Expression) -> str:
     """The text of a TOML file with one expression and the version of the format, for load().
 
     Raises:
-        ValueError: a weight beyond [-1, 1.5], or a control whose name ends in *.
+        ValueError: a weight outside [-1, 1.5], or a control whose name ends in *.
     """
     for control, weight in expression.weights.items():
         if not _SAVED[0] <= weight <= _SAVED[1]:

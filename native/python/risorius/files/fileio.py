@@ -77,7 +77,7 @@ class _Named(io.FileIO):
 
 
 def write_bytes(path: _Path, data: ReadableBuffer) -> None:
-    """Write a file atomically, see replacing().
+    """Write a file that receives its name when it is complete and on disk, as by replacing().
 
     Args:
         path: path of a file in an existing folder.
@@ -91,7 +91,7 @@ def write_bytes(path: _Path, data: ReadableBuffer) -> None:
 
 
 def write_text(path: _Path, text: str) -> None:
-    """Write a text file atomically, see replacing().
+    """Write a text file that receives its name when it is complete and on disk, as by replacing().
 
     Args:
         path: path of a file in an existing folder.
@@ -181,6 +181,7 @@ def check_writable(path: _Path, *, parents: bool = False) -> None:
     """Check before long work whether replacing(path) will be possible.
 
     Args:
+        path: path of a file; an existing file is not changed.
         parents: True: missing folders are allowed, because they will be made.
 
     Raises:

@@ -60,7 +60,7 @@ def jpeg(pixels: Pixels, quality: int = 85, *, fine_color: bool = False) -> byte
     image = pixels[::-1].astype(np.float64)
     planes = [image] if image.ndim == 2 else list(np.moveaxis(image @ _YCC.T, 2, 0))
     planes[0] = planes[0] - 128.0
-    side = 2 if len(planes) == 3 and not fine_color else 1  # per side of a unit
+    side = 2 if len(planes) == 3 and not fine_color else 1  # blocks of brightness along a unit
     tables = [_scaled(_LUMA, quality), _scaled(_CHROMA.ravel(), quality)]
     units = []
     for number, plane in enumerate(planes):
@@ -103,6 +103,11 @@ def _blocks(plane: Floats, side: int, table: Pixels) -> Ints:
     """int64[units, side * side, 64]: quantised DCT coefficients of each block, in zigzag order.
 
     A unit of the file is a square of `side` by `side` blocks of 8 by 8 pixels.
+
+    Args:
+        plane: float64[h, w], one component of the image; both sides are multiples of 8 * side.
+        side: number of blocks along a unit.
+        table: uint8[64], quantisation table, row by row.
     """
     rows, columns = (size // (8 * side) for size in plane.shape)
     cut = plane.reshape(rows, side, 8, columns, side, 8).transpose(0, 3, 1, 4, 2, 5)

@@ -30,8 +30,9 @@ class LockedError(RisoriusError):
 def locked(folder: Path) -> Iterator[None]:
     """Hold the lock of an existing folder during the context.
 
-    The operating system ends the lock when the process ends, even if it is killed. A file
-    `.risorius.lock` contains the name of the holder.
+    The operating system ends the lock when the process ends, even if it is killed. On a file system
+    without locks, the lock counts as held while the process named in the file may run. The file
+    `.risorius.lock` names the process, the machine and the time.
 
     Raises:
         LockedError: another process holds the lock; the text has the process, the machine and the
@@ -44,8 +45,9 @@ def locked(folder: Path) -> Iterator[None]:
         os.write(handle, _about_this_process())
         yield
     finally:
-        # The file is removed before the lock ends, so that `_open` of a waiting process notices
-        # it. Windows cannot remove an open file, so there the file is closed first.
+        # The file is removed before the lock ends, so that another process, which opened the file
+        # before, notices the removal in `_open`. Windows cannot remove an open file, so there the
+        # file is closed first.
         if sys.platform != "win32":
             _remove(folder)
         os.close(handle)

@@ -23,8 +23,8 @@ def file_name(name: str, ending: str = "", taken: Iterable[str] = ()) -> str:
     """Make a file name for a named object, valid on every system.
 
     A safe name stays unchanged. Otherwise separators, drives, wildcards and unprintable characters
-    become "_"; dots and spaces at both ends are removed; "_" is put before the name of a device; a
-    long name is shortened between characters.
+    become "_"; dots and spaces at both ends are removed; an empty name becomes "unnamed"; "_" is
+    put before the name of a device; a long name is shortened between characters.
 
     Args:
         name: any text, even empty.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads and writes PNG files in this package's form: 8 bits, grey or colour, filters 0 to 2."""
+"""Reads and writes PNG files in this package's form: 8 bits, grey, colour, or colour with opacity,
+filters 0 to 2."""
 
 from __future__ import annotations
 
@@ -96,6 +97,9 @@ def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
     Args:
         data: the bytes of the file.
         opacity: True: also read images [h, w, 4], whose fourth value is the opacity.
+
+    Returns:
+        uint8[h, w], [h, w, 3] or [h, w, 4]; row 0 is the bottom.
     """
     shape = pixels_of(data, opacity=opacity)
     if shape is None:
@@ -117,7 +121,7 @@ def pixels_of(data: bytes, *, opacity: bool = False) -> tuple[int, int, int] | N
 
     Args:
         data: the bytes of the file.
-        opacity: see read_pixels.
+        opacity: True: also accept images of colour with opacity.
     """
     width, height, depth, kind = _header(data)
     values = ({0: 1, 2: 3, 6: 4} if opacity else {0: 1, 2: 3}).get(kind, 0)

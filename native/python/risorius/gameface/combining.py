@@ -121,7 +121,8 @@ class Sums:
         return sorted(out, key=lambda one: -one.error_mm)
 
     def apart(self, of: tuple[str, ...], kind: str = PRODUCT) -> float:
-        """The largest deviation of a linear sum of targets from the rig, in mm.
+        """The largest deviation of a linear sum of targets from the rig in mm, at the target
+        weights at which the combination's weight is largest.
 
         Args:
             of: names of the targets.

@@ -316,7 +316,8 @@ class _Maker:
         return found, move
 
     def lines(self, written: Written) -> list[str]:
-        """One line per group: numbers of targets and vertices, bytes, deviation of linear sums."""
+        """One line per group of targets, and for combinations: number of targets, vertices and
+        bytes, deviation of linear sums from the rig."""
         out = []
         for group, found in self._found.items():
             tried, there = self._sums.tried[group]

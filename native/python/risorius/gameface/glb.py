@@ -27,7 +27,8 @@ class Glb:
     Attributes:
         table: the JSON; callers append nodes and meshes to its lists.
         packs: whether vertices and triangles are packed with meshoptimizer.
-        sparse: whether an accessor whose rows are mostly zero stores only the nonzero rows.
+        sparse: whether an accessor of a morph target whose rows are mostly zero stores only the
+            nonzero rows; without effect if `packs` is set.
         pictures: name of a picture file of the face without suffix, "_" and the role of the picture
             -> number of the texture made from the file.
     """

@@ -47,7 +47,7 @@ def measured(points: Points, sums: Sums, targets: Mapping[str, Target]) -> Manne
 
 
 def _turn(points: Points, delta: npt.NDArray[np.float32]) -> float:
-    """Mean rotation of the eyeballs by a target, in degrees; 0 for a face without eyes.
+    """Mean rotation of the eyeballs that a target moves, in degrees; 0 if it moves none.
 
     Args:
         points: vertices of the LOD, in the rest pose.

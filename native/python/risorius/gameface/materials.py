@@ -32,7 +32,7 @@ _PLAIN = {
     "wet": ((1.0, 1.0, 1.0), 0.05),
 }  # fmt: skip
 _WET = 0.06  # opacity of tears and corneas
-_SMOOTH = {"magFilter": 9729, "minFilter": 9987}  # a sampler
+_SMOOTH = {"magFilter": 9729, "minFilter": 9987}  # glTF's codes of a linear filter with mipmaps
 _CUT = 0.35  # opacity below which hair is cut away
 
 
@@ -54,7 +54,8 @@ class Materials:
             mesh: name of the mesh in the DNA file.
             glb: the file that receives the material.
             known: material name -> number in `glb`; a known material is not added again.
-            longest: largest number of pixels of a picture's longer side.
+            longest: largest number of pixels of a picture's longer side; half of it for hair,
+                lashes and roughness.
         """
         base, kind = base_name(mesh), kind_of(mesh)
         name = safe(base)
@@ -128,7 +129,7 @@ class Materials:
         if label not in glb.pictures:
             images.append({"name": label, "mimeType": media, "bufferView": glb.view(data)})
             samplers = glb.table.setdefault("samplers", [])
-            if _SMOOTH not in samplers:  # those of a body are others
+            if _SMOOTH not in samplers:  # the list may have samplers from the file of a body
                 samplers.append(_SMOOTH)
             number = samplers.index(_SMOOTH)
             textures.append({"source": len(images) - 1, "sampler": number})

@@ -42,7 +42,7 @@ _LOUDEST = 1200  # vertices with the largest errors, by which combinations are c
 _MAIN = 80  # principal components of the errors that are kept
 _RIDGE = 1e-4
 _LEAST_GAIN = 0.001  # share of the initial squared error that a combination must remove
-_OFTEN = 12  # number of poses in which a function must be above 0
+_OFTEN = 12  # a function that differs from 0 in this number of poses or fewer is not used
 _NEW = 0.05  # share of a function's length that the chosen functions must not explain
 _LEAST = 2e-6  # metres: shorter displacements are set to 0
 
@@ -80,7 +80,7 @@ class Refiner:
 
         Args:
             poses: float64[n, targets], weights from 0 to 1.
-            most: largest number of combinations.
+            most: largest number of combinations; never more than MOST (120) are made.
         """
         wanted = list(self._candidates(poses))
         if not wanted or most < 1:

@@ -15,7 +15,7 @@ MOST = 500
 
 
 def frames_of(path: Path) -> list[dict[str, float]]:
-    """Frames of a capture, each as unit -> weight.
+    """At most MOST (500) frames of a capture, evenly spread, each as ARKit unit -> weight.
 
     Args:
         path: path of a Live Link Face file, or of another file whose curves are ARKit units.

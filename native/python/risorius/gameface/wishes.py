@@ -19,11 +19,13 @@ class Wishes:
         shapes: groups of targets, some of GROUPS.
         lod: number of the LOD.
         skeleton: whether to write joints of root, neck, head, jaw and eyes.
-        sparse: whether morph targets store only the vertices that move.
+        sparse: whether morph targets store only the vertices that move; without effect if `meshopt`
+            is set.
         quantize: whether values of vertices are stored as integers of 8 or 16 bits.
         meshopt: whether vertices and triangles are compressed with meshoptimizer.
         normals: whether targets change normals too.
-        textures: largest number of pixels of a picture's longer side.
+        textures: largest number of pixels of a picture's longer side; half of it for hair, lashes
+            and roughness.
         mb: size limit of the file in MB, None for no limit.
         most: largest number of targets that the app showing the file accepts, None for no limit.
         within: allowed deviation of sums of two targets from the rig, in mm; larger deviations are

@@ -211,6 +211,8 @@ class Scene:
     """The settings, objects and connections of a file.
 
     Attributes:
+        name: the file's name in errors.
+        ticks: units of the key times per second.
         settings: GlobalSettings, or None.
         objects: id -> record.
         parents: id -> (parent's id, connected property or "") of each connection, in file order.
@@ -250,6 +252,8 @@ class Scene:
 def read(data: bytes, name: str, take: str | None = None, budget: Budget | None = None) -> Take:
     """The curves of one animation stack, which FBX software shows as a take or clip.
 
+    A file without stacks gives all its curves.
+
     The curve of a blend shape channel has the channel's name, with its percentage as a fraction.
     The curve of a property has the property's name, whichever node has it, because exporters of
     rigs put such properties on any node. A node whose name begins with CTRL_ is a slider of a face
@@ -258,7 +262,8 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
     Args:
         data: the whole file.
         name: the file's name in errors.
-        take: name or number of a stack; None: the first stack with curves of these three kinds.
+        take: name of a stack, or its number from 0; None: the first stack with curves of these
+            three kinds.
         budget: limits memory and work; None: a limit by the size of the file.
 
     Raises:
@@ -453,7 +458,8 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
         notes: receives a sentence if weighted tangents are read as unweighted ones.
 
     Raises:
-        AnimationFileError: numbers of times and values differ, or times do not ascend.
+        AnimationFileError: numbers of times and values differ, a value is not finite, or times do
+            not ascend.
     """
     ticks = node.array("KeyTime")
     scene.budget.hold(ticks.size * _KEY_BYTES, f"{ticks.size} keys")
@@ -486,8 +492,8 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
     """int64[count] and float64[count, 2]: the flags of each keyframe, and two slopes.
 
     The slopes are the one after the keyframe and the one before the next keyframe. The file stores
-    flags and slopes once for each run of consecutive keyframes that share them. If the runs do not
-    sum to `count`, all keyframes are linear.
+    flags and slopes once for each run of consecutive keyframes that share them. If the runs are
+    damaged or do not sum to `count`, all keyframes are linear.
 
     Args:
         node: record of the AnimationCurve.
@@ -511,7 +517,8 @@ def _auto(
 ) -> tuple[Doubles, Doubles]:
     """Sets the slopes of keyframes with automatic tangents.
 
-    The slope is that of the line through the two neighbouring keyframes, or 0 at a clamped extreme.
+    The slope is that of the line through the two neighbouring keyframes (at the ends: through the
+    keyframe and its only neighbour), or 0 at a clamped extreme.
 
     Args:
         times, values: float64[keys], seconds and values of the keys.

@@ -440,7 +440,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
         budget: limits memory and work; None: by the size of the file.
 
     Raises:
-        AnimationFileError: not a GLB of version 2, or a truncated file.
+        AnimationFileError: not a GLB of version 2, a truncated file, or no valid JSON in it.
     """
     budget = budget or Budget.of(len(data))
     name = str(path)
@@ -518,11 +518,12 @@ def read(document: Document, take: str | None = None) -> Take:
 
     Args:
         document: from `open_glb` or `open_gltf`.
-        take: name or number of an animation; None: the first one that animates morph targets
-            or such properties.
+        take: name of an animation, or its number from 0; None: the first one that animates morph
+            targets or such properties.
 
     Raises:
-        AnimationFileError: no such animation, or missing parts of it.
+        AnimationFileError: no such animation, none that animates morph targets or such
+            properties, or missing parts of it.
     """
     notes: list[str] = []
     animations = document.json.get("animations")

@@ -52,7 +52,7 @@ class Reader:
         """
         found = math.nan
         if isinstance(value, int | float | str) and not isinstance(value, bool):
-            try:  # some write numbers as text
+            try:  # some programs write numbers as text
                 found = float(value)
             except (ValueError, OverflowError):
                 found = math.nan
@@ -155,7 +155,8 @@ class Reader:
             rate: frames per second; None: inferred from the times.
 
         Raises:
-            AnimationFileError: a repeated name, or a curve in which all values are missing.
+            AnimationFileError: a repeated name, a curve in which all values are missing, or times
+                of which more than a third do not ascend.
         """
         if len(set(names)) != len(names):
             twice = next(name for name in names if list(names).count(name) > 1)

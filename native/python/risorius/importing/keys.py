@@ -26,7 +26,8 @@ class Keys:
     Attributes:
         times: float64[keys], seconds, ascending.
         values: float64[keys].
-        kinds: uint8[keys], interpolation after each key; empty: linear everywhere.
+        kinds: uint8[keys], interpolation after each key: CONSTANT, LINEAR or CUBIC; empty: linear
+            everywhere.
         leave: float64[keys], slope just after each key, per second; empty unless a key is CUBIC.
         arrive: float64[keys], slope just before each key, per second; empty as `leave`.
     """
@@ -42,7 +43,8 @@ class Keys:
         return self.kinds.size == 0 or bool((self.kinds[:-1] == LINEAR).all())
 
     def sample(self, at: Doubles) -> Doubles:
-        """Values at times in seconds, constant before the first and after the last key."""
+        """Values at times in seconds, constant before the first and after the last key; 0 for a
+        curve without keys."""
         if self.times.size == 0:
             return np.zeros(at.size)
         straight = np.interp(at, self.times, self.values)
@@ -73,10 +75,11 @@ def on_one_clock(
 ) -> tuple[Doubles, Doubles]:
     """Resamples all curves at the union of their keyframe times.
 
-    Linear curves are then exact. Smooth and stepped curves are also sampled `rate` times per
-    second.
+    Linear curves are then exact. If a curve is smooth or stepped, all curves are also sampled
+    `rate` times per second.
 
     Args:
+        curves: curves with keyframes; a curve without any becomes 0.
         rate: samples per second, or None for no samples between keyframes.
         budget: budget of the file.
 

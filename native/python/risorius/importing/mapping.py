@@ -111,7 +111,11 @@ class Mapping:
         return tuple(dict.fromkeys(control for row in self.rows.values() for control in row))
 
     def finder(self) -> Callable[[str], tuple[str, Row] | None]:
-        """A function from a curve's name to (name of its row, {control: weight}), or None."""
+        """A function from a curve's name to (key, {control: weight}), or None.
+
+        The key is the name of the row or, if the row's name is a pattern, the spelling of the
+        curve's name that the pattern matches.
+        """
         exact = {loose_name(key) if self.is_loose else key: key for key in self.rows}
         exact.pop("", None)  # names without letters are all equal here
         patterns = [key for key in self.rows if "*" in key]
@@ -160,7 +164,16 @@ class Mapping:
 
 @dataclass
 class Mapped:
-    """A mapped clip, the controls that each source curve moves, and the curves not used."""
+    """A mapped clip, the controls that each source curve moves, and the curves not used.
+
+    Attributes:
+        clip: curves of controls.
+        mapped: curve of the source -> controls that it moves.
+        unmapped: curves of the source that the mapping does not know.
+        ignored: curves of the source with an empty row, or whose row another curve has used.
+        absent: names of rows, other than patterns and empty rows, without a curve in the source.
+        notes: sentences for the user about curves that are left out.
+    """
 
     clip: Clip
     mapped: dict[str, tuple[str, ...]]
@@ -337,7 +350,7 @@ def mapping_text(name: str) -> str:
 
 
 def load_mapping(source: str | os.PathLike[str] | Mapping) -> Mapping:
-    """Loads a built-in mapping by name, or a TOML file.
+    """Loads a built-in mapping by name, or a TOML file; a Mapping is returned unchanged.
 
     Raises:
         MappingError: missing, not TOML, or inconsistent rows; the message names the place.
@@ -416,7 +429,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 
 
 def _base(table: Table[str, Any], where: str) -> Mapping:
-    """The mapping that the key `base` of a TOML table names; the table's rows are added to it.
+    """The mapping that the key `base` of a TOML table names, or an empty one without this key.
 
     "vocabulary NAME" means the names of a vocabulary of controls.vocabulary. For ARKit and VRM the
     ARKit units are included.
@@ -493,7 +506,7 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
 
     Args:
         key: name of the curve in the source.
-        value: value of the row in the TOML.
+        value: value of the row in the TOML: {control: weight}, or the name of an expression.
         prefix: text before names of controls without a dot.
         where: name of the mapping in errors.
     """

@@ -273,7 +273,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
 
 
 def _weights(frame: Mapping[str, Any]) -> dict[str, Any]:
-    """name -> value of each number in a frame."""
+    """Curve -> value of each number in a frame, except times and frame numbers."""
     at = next((k for k in WEIGHT_KEYS if isinstance(frame.get(k), dict)), None)
     table = frame[at] if at else frame
     return {
@@ -401,7 +401,9 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 
 
 def lists_by_name(reader: Reader, document: object) -> Take | None:
-    """Reads {name: [values], ...}, which may be under "curves", with a rate or a list of times.
+    """Reads {name: [values], ...} with a rate or a list of times.
+
+    The table may be nested under a key of WEIGHT_KEYS, such as "curves".
 
     Returns None if the document has another layout.
 

@@ -33,10 +33,10 @@ def resample(clip: Clip, rate: float) -> Clip:
 
     Args:
         clip: any clip.
-        rate: frames per second of the result, above 0.
+        rate: frames per second of the result, above 0 and below 1e6.
 
     Raises:
-        ValueError: a rate that is not above 0.
+        ValueError: a rate out of range.
     """
     if not 0.0 < rate < 1e6:
         raise ArgumentError(f"a rate above 0 frames per second was expected, found {rate}")
@@ -97,10 +97,10 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
     """Makes a face's neutral values 0: subtracts them, and rescales the rest so that 1 stays 1.
 
     A control with the neutral value n becomes (value - n) / (1 - n), clamped to 0 unless the
-    control was negative in the capture. From angles of head and eyes, n is only subtracted. Some
-    controls are a share of another control, such as the share of the jaw's opening that the lips
-    close. Such controls are calibrated as share times the other control, because a neutral face
-    with shut lips may have any share.
+    control was negative in the capture; the divisor is at least LEAST_RANGE (0.05). From angles of
+    head and eyes, n is only subtracted. Some controls are a share of another control, such as the
+    share of the jaw's opening that the lips close. Such controls are calibrated as share times the
+    other control, because a neutral face with shut lips may have any share.
 
     Args:
         clip: a capture that contains a neutral face.

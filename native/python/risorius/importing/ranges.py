@@ -20,7 +20,8 @@ _USUAL = (100.0, 255.0)  # values of a full movement that files use besides 1
 
 
 def check_options(full: float | None, angles: str | None) -> None:
-    """Checks options. Raises: ArgumentError: full is not above 0, or angles is not a known unit."""
+    """Checks options. Raises: ArgumentError: full is not above 0 and below 1e9, or angles is not a
+    known unit."""
     if full is not None and not 0.0 < full < 1e9:
         raise ArgumentError(f"full_value: a number above 0 was expected, found {full}")
     if angles is not None and angles not in ANGLE_UNITS:

@@ -72,9 +72,10 @@ class Imported:
     """The curves of a file before a mapping is applied.
 
     Attributes:
-        clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
-            the start of the sound.
-        kind: one of KINDS; "curves" for curves that are not from a file.
+        clip: curves with the file's own names and times. Timecodes and dates are counted from the
+            first frame, visemes from the start of the sound.
+        kind: one of KINDS; "curves" for curves that are not from a file, "rzc" or "clip" for a
+            clip file of Risorius.
         mapping: name of the built-in mapping for this kind of file, else of the mapping that knows
             the most curves; "" if none knows any.
         source: the file's name.
@@ -198,6 +199,8 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
 def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
     """Converts GUI curves to raw controls, frame by frame, with the rig's table.
 
+    Raw controls that are 0 in every frame get no curve.
+
     Args:
         clip: curves of GUI controls and angles; the angles are kept.
         rig: rig with the table from GUI controls to raw controls.
@@ -246,9 +249,11 @@ def read(
         rate: frames per second, for tables with frame numbers or without times.
         timecode_rate: frames per second of timecodes, if it cannot be inferred; 29.97 means
             30000/1001, and so on.
-        time_unit: one of importing.TIME_UNITS, for tables and JSON without a unit; "rows" ignores
-            the times, and each row is a frame at `rate`. None: from the file.
-        take: name or number of an animation, for files with several; None: the first with curves.
+        time_unit: unit of the times in tables and JSON, one of importing.TIME_UNITS, used instead
+            of a unit in the file; "rows" ignores the times, and each row is a frame at `rate`.
+            None: from the file.
+        take: name of an animation, or its number from 0, for glTF and FBX with several; None: the
+            first with curves.
 
     Raises:
         AnimationFileError: the file cannot be read or used; the sentence names file and place.

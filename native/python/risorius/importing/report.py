@@ -15,11 +15,13 @@ class Report:
 
     Attributes:
         source: name of the file, or of another source of the curves.
-        kind: kind of file, one of `importing.KINDS`, or "curves" without a file.
+        kind: kind of file: one of `importing.KINDS`, "rzc" or "clip" for a clip file of Risorius,
+            or "curves" without a file.
         mapping: name of the mapping used.
         mapped: curve of the source -> controls that it moves.
         unmapped: curves of the source that the mapping does not know.
-        ignored: curves of the source that the mapping ignores on purpose.
+        ignored: curves of the source that are left out on purpose: by an empty row of the mapping,
+            because another curve has used their row, or because their angles are not kept.
         not_in_rig: controls of the mapping that the rig lacks and that are therefore dropped.
         always_zero: curves of the source that are 0 in every frame.
         bones: curves of the clip that rotate the bones of head and eyes and are no rig controls.

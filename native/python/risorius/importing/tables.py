@@ -130,7 +130,8 @@ def sniff(line: str) -> str:
 def read_table(text: str, name: str) -> Table:
     """Parses a table with a header.
 
-    Comments are skipped. A line "sep=;" sets the delimiter, as in files of Excel.
+    Comments are skipped. A line "sep=;" sets the delimiter, as in files of Excel. A last row that
+    is too short is dropped with a note.
 
     Args:
         text: content of the file, with commas, tabs, semicolons or | between cells.

@@ -159,7 +159,7 @@ def read_rhubarb_tsv(text: str, name: str) -> Take:
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: an invalid line, times that do not ascend.
+        AnimationFileError: an invalid line, fewer than two lines, times that do not ascend.
     """
     starts: list[tuple[float, str]] = []
     for line, row in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
@@ -209,7 +209,12 @@ def _rhubarb_starts(starts: list[tuple[float, str]], name: str) -> Take:
 def _check_order(starts: Sequence[tuple[float, str]], name: str, line: int) -> None:
     if starts[-1][0] < 0.0 or (len(starts) > 1 and starts[-1][0] < starts[-2][0]):
         raise AnimationFileError(
-            name, f"times that ascend from 0 were expected, found {starts[-1][0]:g}", line=line
+            name,
+            (
+                f"times that ascend from 0 were expected, found {starts[-1][0]:g}: no "
+                "time below 0 s or before the previous time"
+            ),
+            line=line,
         )
 
 
@@ -299,7 +304,11 @@ def _rhubarb_cues(rows: Sequence[tuple[str, str, str]], name: str) -> Take:
         before = cues[-1].end if cues else 0.0
         if not before - 0.005 <= cue.start <= cue.end < np.inf:
             raise AnimationFileError(
-                name, f"{place}: times that ascend were expected, found {start} to {end}"
+                name,
+                (
+                    f"{place}: times that ascend from {before:g} s were expected, found "
+                    f"{start} to {end}"
+                ),
             )
         if cue.start > before + 0.005:
             cues.append(Cue(before, cue.start, "X"))
@@ -316,7 +325,8 @@ def read_dat(text: str, name: str, rate: float | None = None) -> Take:
         rate: frames per second; None: from an FPS line, else DAT_RATE with a note.
 
     Raises:
-        AnimationFileError: an invalid line, frames that do not ascend.
+        AnimationFileError: an invalid line, a rate that is not above 0, fewer than two shapes, or
+            frames that do not ascend.
     """
     lines = re.split(r"\r\n|\n|\r", text)
     notes: list[str] = []
@@ -383,7 +393,10 @@ class Lines:
 
 
 class Word(NamedTuple):
-    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame."""
+    """A word of a Papagayo file; `start` and `end` are frames from 0, `end` is the last frame.
+
+    `phonemes` has (first frame, mouth shape) of each phoneme.
+    """
 
     text: str
     start: int
@@ -446,7 +459,7 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
         name: the file's name in errors.
 
     Raises:
-        AnimationFileError: tables in another form.
+        AnimationFileError: tables in another form, no phonemes, or frames that do not ascend.
     """
     try:
         voices = [
@@ -492,7 +505,13 @@ def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: st
         starts.append((word.end + 1, "rest"))
     times = [frame for frame, _ in starts]
     if any(b < a for a, b in pairwise(times)) or starts[0][0] < 0:
-        raise AnimationFileError(name, f"voice {voice!r}: frames that ascend were expected")
+        raise AnimationFileError(
+            name,
+            (
+                f"voice {voice!r}: frames of 0 or more, none before the previous frame, were "
+                "expected"
+            ),
+        )
     cues = _from_starts(
         [(frame / rate, shape) for frame, shape in starts], (times[-1] + 1) / rate, "rest"
     )

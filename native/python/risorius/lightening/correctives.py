@@ -16,7 +16,7 @@ from ..base.words import counted
 from .poses import Pose, motions_at
 
 _AT_ONCE = 1 << 15  # limits the number of joints that are posed together
-_LOOKED_AT = 6000  # largest number of vertices that is needed to rank correctives
+_LOOKED_AT = 6000  # vertices that suffice to rank correctives; fewer than twice as many are used
 
 
 def needed_correctives(dna: Dna) -> set[int]:

@@ -59,7 +59,8 @@ def needed_joints(dna: Dna, asked: Sequence[str] = ()) -> list[int]:
 
 
 def mirrored_joints(dna: Dna) -> Ints:
-    """int64[joints]: the joint at the mirrored position on the other side, or the joint itself.
+    """int64[joints]: the joint at the mirrored position on the other side, up to 0.1 % of the
+    face's extent; the joint itself if there is none or if it lies in the middle.
 
     Args:
         dna: the face.
@@ -115,9 +116,10 @@ class Leaving:
             leaving: number of joints to remove.
             fixed: joints that must stay.
             parents: int64[J]; a joint stays until all of its children are removed.
-            pairs: int64[J], the mirrored joint; both are removed together.
-            levels: bool[J, LODs], the LODs that list a joint; its heirs must be listed in these
-                LODs too.
+            pairs: int64[J], the mirrored joint; both are removed together if both may be removed
+                and `leaving` allows it.
+            levels: bool[J, LODs], the LODs that list a joint; its heirs are listed in these LODs
+                too, if such joints remain.
         """
         self.levels = levels
         can = np.ones(len(parents), bool)

@@ -36,7 +36,7 @@ from .weights import Refit
 Progress = Callable[[float], bool | None]
 
 _ROUNDS = 4  # largest number of rounds of choosing joints and refitting weights
-_BETTER = 0.97  # a further round follows if the error is below this fraction of the last one
+_BETTER = 0.97  # a further round follows if the error is below this fraction of the smallest one
 _FIGHT = 1.0  # exponent by which the importance of a pose grows with its error
 # Memory limit of intermediate tables in bytes: a constant, plus a factor times the face's size.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 29, 128
@@ -137,7 +137,7 @@ def lighten(
         dna: a face with meshes; not changed.
         joints: number of joints to keep; None: all that the kept LODs need.
         correctives: number of correctives to keep; None: all.
-        lods: numbers of the LODs to keep, 0 is the finest; None: all.
+        lods: numbers of the LODs to keep, 0 is the finest, in any order; None: all.
         keep: names of further joints that must stay.
         shapes_mm: blend shapes correct vertices with a larger error in mm; None: no blend shapes.
         measured: whether to report the errors of all expressions.
@@ -267,7 +267,8 @@ def _fewer_correctives(work: _Work, rig: Rig, correctives: int) -> list[int]:
 
 
 def _without(dna: Dna, leaving: Sequence[int]) -> Dna:
-    """The face without the correctives in `leaving`."""
+    """The face without the correctives in `leaving`, and without joint groups and columns of zeros
+    that remain."""
     if not leaving:
         return dna
     stays = [row not in set(leaving) for row in range(dna.psd_count)]
@@ -301,7 +302,8 @@ def _fewer_joints(work: _Work, dna: Dna, joints: int, keep: Sequence[str]) -> tu
     """The face with `joints` joints, and the indices of the removed joints.
 
     Poses with large errors get more importance in the next round. The result is the round whose
-    largest error at LOD 0 is smallest; rounds end when that error stops falling.
+    largest error at LOD 0 is smallest; rounds end when that error falls by less than 3 %, or after
+    four rounds.
 
     Args:
         work: the source face and its poses.

@@ -22,7 +22,13 @@ Told = Callable[[float], None]
 
 
 class Vertices:
-    """All vertices of a LOD, posed by the evaluator."""
+    """All vertices of a LOD, posed by the evaluator.
+
+    Attributes:
+        meshes: indices of the LOD's meshes.
+        counts: number of vertices of each of these meshes.
+        count: number of all these vertices.
+    """
 
     def __init__(self, dna: Dna, rig: Rig, lod: int) -> None:
         """Args:
@@ -50,7 +56,7 @@ def errors(
     before: Dna, after: Dna, rigs: tuple[Rig, Rig], poses: Sequence[Pose], told: Told
 ) -> tuple[Doubles, Doubles]:
     """The largest and the root mean square distance between the vertices of two faces, each
-    float64[poses, LODs], in the file's unit.
+    float64[poses, LODs], in the file's unit; 0 for a LOD without vertices.
 
     Args:
         before: one face.
@@ -74,7 +80,8 @@ def errors(
 
 
 def microseconds(rig: Rig) -> float:
-    """Median duration in microseconds of one evaluation at LOD 0 with sixty active controls.
+    """Median duration in microseconds of one evaluation at LOD 0, with sixty active controls, or
+    with all controls if there are fewer.
 
     Args:
         rig: the rig to time.

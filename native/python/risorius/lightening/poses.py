@@ -41,7 +41,8 @@ def poses_of(dna: Dna, rig: Rig) -> list[Pose]:
     """A pose per raw control at 1, then a pose per corrective with all of its controls at 1.
 
     Controls that are components of a joint's rotation get no pose, because their values are not
-    weights. For a corrective that a pose solver drives, the pose has the solver's rotations.
+    weights. For a corrective that a pose solver drives, the pose has the solver's rotations. A
+    corrective that reads an output of a network gets no pose.
 
     Args:
         dna: the face.

@@ -22,8 +22,9 @@ def add_shapes(
 ) -> Dna:
     """Adds blend shapes to the lighter face for vertices with a larger error than the tolerance.
 
-    Expressions come first, then correctives of two controls, then of more; each step corrects the
-    error that is left. Only LODs that have blend shapes get new ones.
+    Expressions come first, then correctives by the number of their controls, where four or more
+    count as one step; each step corrects the error that is left. Only LODs that have blend shapes
+    get new ones.
 
     Args:
         before: the source face, with the same LODs and meshes.

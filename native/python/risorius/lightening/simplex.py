@@ -14,8 +14,9 @@ _LEAST = 1e-4  # smaller weights are dropped
 def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
     """float64[n, k]: for each problem, weights w that minimise w^T G w - 2 b^T w.
 
-    The weights are at least 0 and sum to 1. Negative weights of a problem are removed all at once,
-    then the smallest until `most` are left, so the result is near the minimum but not always exact.
+    The weights are at least 0 and sum to 1. Weights below 1e-4 of a problem are removed all at
+    once, then the smallest until `most` are left, so the result is near the minimum but not always
+    exact.
 
     Args:
         grams: float64[n, k, k], G of each problem, symmetric.

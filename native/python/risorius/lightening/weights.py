@@ -13,7 +13,8 @@ from ..author.geometry.skeleton import Doubles, Ints
 from .simplex import shares
 
 _MOST = 12  # largest number of joints per vertex, usual for such faces
-_TAKEN_OVER, _NEAR = 14, 6  # joints that are tried per vertex: heirs, and nearest joints
+# Joints that are tried per vertex: those with the largest weights, and the nearest ones.
+_TAKEN_OVER, _NEAR = 14, 6
 _AT_ONCE = 512  # number of vertices that are refitted together
 _EVEN = 3e-3  # strength of the pull towards the weights after the takeover, which are smooth
 
@@ -97,8 +98,8 @@ class Refit:
     def _tried(self, points: Doubles, rows: Doubles) -> Ints:
         """int64[n, k]: joints that a vertex may follow, with repetitions.
 
-        The joints are the ones that took over the vertex, the parent of the first one, and the
-        nearest joints.
+        The joints are the ones with the largest weights in `rows`, the parent of the first of them,
+        and the nearest joints.
 
         Args:
             points: float64[n, 3], the vertices relative to the face's centre.

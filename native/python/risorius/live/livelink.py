@@ -44,6 +44,9 @@ class NoFace(LiveError):  # noqa: N818  not an error of the sender
 def decode(data: bytes) -> Packet:
     """Decodes a packet.
 
+    Args:
+        data: bytes of the packet.
+
     Raises:
         NoFace: the packet has no values.
         LiveError: not a packet of Live Link Face, or a value that is no blend shape or angle.

@@ -172,6 +172,14 @@ class Receiver:
         source: "livelink" or "osc".
         port: number of the port; 0 for any free port; None for the source's usual port.
         host: address to listen on: THIS_MACHINE, or EVERYWHERE for phones.
+
+    Attributes:
+        source: the source.
+        host: the address to listen on.
+        port: number of the port; after `start` the number that the system chose for 0.
+
+    Raises:
+        LiveError: an unknown source.
     """
 
     def __init__(
@@ -201,7 +209,12 @@ class Receiver:
         self.stop()
 
     def start(self) -> None:
-        """Starts to listen. Raises: LiveError: the port is in use, or a package is missing."""
+        """Starts to listen; no effect if it listens already.
+
+        Raises:
+            LiveError: the port is in use or no valid number, the address cannot be used, or
+                python-osc is missing.
+        """
         if self._thread is not None:
             return
         if self.source == "osc":
@@ -247,9 +260,11 @@ class Receiver:
         return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:
-        """Records a subject until `finish`; for "", the subject whose packets arrive first.
+        """Records a subject until `finish`.
 
         Args:
+            subject: name of the subject; "": the first known one, or, before any frame, the one
+                whose frame arrives first.
             limit: largest number of frames; the default is half an hour at 60 per second.
         """
         with self._lock:
@@ -266,7 +281,8 @@ class Receiver:
         return take
 
     def status(self, subject: str = "") -> Status:
-        """The statistics of the reception, with the rate and age of a subject."""
+        """The statistics of the reception, with the rate and age of a subject; for "", of the
+        first subject."""
         now = perf_counter()
         with self._lock:
             found = self._find(subject)

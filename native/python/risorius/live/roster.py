@@ -2,7 +2,7 @@
 """A list of senders with limited places, and the rule by which a new sender takes a place.
 
 A flood of forged senders must not displace a phone. A sender that is silent for a minute loses its
-place, unless it is wanted. If all places are taken:
+place when the next new sender arrives, unless it is wanted. If all places are taken:
     a wanted sender (named or recorded) always gets a place and keeps it
     a sender that has never streamed gives its place to any newcomer
     the first sender of an address, once it has streamed, gives its place only to a wanted one
@@ -19,7 +19,7 @@ from typing import Generic, TypeVar
 
 MOST = 32
 _STREAM = 5  # messages within a second that make a sender a streaming one
-_FORGOTTEN = 60.0  # seconds of silence after which any newcomer takes the place
+_FORGOTTEN = 60.0  # seconds of silence after which a place is freed when a new sender arrives
 
 Key = TypeVar("Key", bound=Hashable)
 Item = TypeVar("Item")

@@ -151,13 +151,15 @@ class Shaper:
     Attributes:
         mapping: the Mapping; names that it lacks may be raw controls, head angles, or names of any
             vocabulary.
-        gain: factor on all controls except shares of another control, so that shut lips stay shut.
+        gain: factor on all controls except the head's angles and shares of another control, so that
+            shut lips stay shut.
         head_gain: factor on the head's angles; a negative factor reverses them.
         gains: name in the frame -> factor, in addition to `gain`.
         smoothing: strength of the one-euro filter, 0 (none) to 1; it calms a still face and passes
             quick movements.
-        maximum: upper limit of control values.
-        neutral: values of the neutral face, by name in the frame; see `capture`.
+        maximum: upper limit of control values, except the head's angles.
+        neutral: name in the frame -> value in the neutral face, which is subtracted; `capture` sets
+            it. Empty: nothing is subtracted.
         ranges: the person's ranges, applied to controls before the gain; None: no remapping. If
             `neutral` is set, only the extremes of the ranges are used.
     """

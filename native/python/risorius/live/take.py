@@ -15,6 +15,7 @@ class Take:
 
     Attributes:
         subject: the recorded subject; "" until the first frame determines it.
+        limit: largest number of frames.
         full: number of frames that arrived after the limit was reached, and were dropped.
     """
 
@@ -28,7 +29,13 @@ class Take:
         return len(self._frames)
 
     def add(self, frame: Frame) -> None:
-        """Appends a frame of the subject; a frame that is not later replaces the last one."""
+        """Appends a frame of the subject; frames of other subjects are ignored.
+
+        A frame that is not later than the last one replaces it, at the time of the last one.
+
+        Args:
+            frame: the next frame in order of arrival.
+        """
         self.subject = self.subject or frame.subject
         if frame.subject != self.subject:
             return

@@ -22,7 +22,8 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
 
     If all parents have joint groups with equal rows and columns, the mix has these groups too.
     Otherwise joint groups that share a joint are merged into one group with all their rows and
-    columns, or into several if one would have far more coefficients.
+    columns, or into several if one would have over four times as many coefficients as they. Groups
+    that move a joint with quaternion rotation are never merged.
 
     Args:
         parents: compatible faces.

@@ -77,10 +77,11 @@ def mix_faces(
     """Makes the weighted mean of faces.
 
     Args:
-        parents: faces with equal names, topology and behavior; they are not changed.
+        parents: faces with equal names, topology and behavior, which check_compatible checks; they
+            are not changed.
         mix: the shares of the parents.
         name: name of the new face; None: from the parent with the largest share.
-        masks: masks of the first parent's regions; None: they are computed.
+        masks: masks of the first parent's regions; None: they are computed if they are needed.
 
     Returns:
         The mixed face. If one parent has all shares, the mix equals that parent bitwise, except
@@ -324,7 +325,7 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
         held += np.bincount(holds, weights=weight, minlength=count)
         for region, part in enumerate(masks.meshes[m].T):
             sums[:, region] += np.bincount(holds, weights=weight * part[vertex], minlength=count)
-    # A joint without vertices takes the mask of its children.
+    # A joint without vertices takes the mask of its children; without any, it is of the skull.
     for joint in reversed(sk.parent_order(dna)):
         parent = int(dna.joint_parents[joint])
         if parent != joint and held[parent] < 1e-6 and held[joint] > 0:
@@ -353,8 +354,8 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
     places = [sk.world_matrices(p, rest)[:, :3, 3] for p in parents]
     world = share.places(places)
     local = mean_of(shifts, weights)
-    # If no region is moved and all rotations are equal, the mean of local translations gives the
-    # same positions without rounding errors.
+    # If no region is moved, all rotations are equal, and a joint has the weights of its parent, the
+    # mean of its local translations gives the same position without rounding errors.
     alike = all(np.array_equal(turns[0], t) for t in turns[1:]) and not share.shift.any()
     frames = np.tile(np.eye(4), (count, 1, 1))
     matrices = sk.rotation_matrices(Convention.of(out), rotations)
@@ -397,7 +398,8 @@ def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
 
 
 def _maps(out: Dna, parents: Sequence[Dna], shares: Doubles) -> None:
-    """Sets the mean slopes and cuts of the conditional table of animated maps."""
+    """Sets the slopes and cuts of the conditional table of animated maps to the parents' means by
+    their shares in the whole face, float64[P]."""
     maps = copy.copy(parents[0].animated_maps)
     conditionals = copy.copy(maps.conditionals)
     own = [p.animated_maps.conditionals for p in parents]

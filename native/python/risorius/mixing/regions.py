@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Finds the regions of a face as soft masks, by the controls that move a vertex; the neck consists
-of the vertices of its joints.
+"""Finds the regions of a face as soft masks, by the controls that move a vertex. The vertices of
+the neck's, spine's and clavicles' joints also belong to the neck.
 
 The masks of a vertex sum to 1. A rigid mesh (eye, teeth, tongue) belongs to one region; meshes on
 the skin (lashes, clear films on the eyes) have the mask of the nearest skin.

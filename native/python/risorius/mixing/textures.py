@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Makes textures of mixed faces: blends a texture if all parents have it.
 
-Skin textures are mixed by the shares of the whole face, because skin has one tone; textures of eyes
-use the shares of their region. Only images written by this package are mixed, and no hair textures,
+Skin textures are mixed by the shares of the whole face, because skin has one tone; textures of
+rigid meshes, such as eyes and teeth, use the shares of their region. Only images written by this
+package are mixed, and no hair textures,
 because hair comes from one parent. For other images the file of the parent with the largest share
 is used.
 """
@@ -35,7 +36,7 @@ WHY = {
 }
 """Why an image comes from the leading parent alone: key -> reason."""
 _KEY = "texture:"
-_MOST_BYTES = 1 << 28  # bytes: larger images are refused
+_MOST_BYTES = 1 << 28  # bytes: larger images count as missing
 _MASKS = "*_msk.png"  # wrinkle masks, which have no metadata entry and are recognised by name
 
 
@@ -61,11 +62,14 @@ def mix_textures(
         masks: masks of the first parent's regions.
 
     Returns:
-        File name -> bytes; and file name -> key in WHY of the reason, for textures that come from
-        the leading parent alone.
+        File name -> bytes; and file name -> key in WHY of the reason, for textures in the metadata
+        that come from the leading parent alone. A texture that the leading parent lacks is left
+        out.
 
     Raises:
         BudgetError: small files that declare huge images.
+        OSError: a wrinkle mask of the leading parent cannot be read.
+        ReadingError: a wrinkle mask of the leading parent is larger than 256 MB.
     """
     whole = mix.whole()
     most = int(whole.argmax())

@@ -38,9 +38,9 @@ class ExpressionRow:
     motion: float  # RMS displacement of the vertices
     rms: float  # RMS error with joints only
     largest: float  # largest error with joints only
-    between: float  # largest error at the weights 0.25, 0.5 and 0.75
+    between: float  # largest error with joints only at the weights 0.25, 0.5 and 0.75
     with_shapes: float  # largest error with blend shapes
-    worst: str  # mesh and vertex of the largest error
+    worst: str  # mesh name and vertex index of `largest`, with a space between
 
 
 def render(

@@ -2,7 +2,8 @@
 """Learns the neutral and the extreme value of each control from a take.
 
 A control is not rescaled if the take does not prove its range: if it hardly moves, is never at
-rest, or does not come near its extreme. Both sides of a face get the same range.
+rest, or does not come near its extreme. Gaze and shares of other controls are never rescaled. Both
+sides of a face get the same range.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ _WIDEST = 4  # frames to either side: largest window of the median, which limits
 _NEAR = 0.8  # fraction of the highest peak from which a peak counts as extreme
 _LOW_PEAKS = 25  # percentage of the extreme peaks that may stay below 1 after rescaling
 _LOW_BLINKS = 10  # the same for lids, because an incomplete blink is noticeable
-_CEILING = 0.85  # in a performance, half of the peaks must reach this fraction of the highest
+# In a performance, half of the peaks must reach this fraction of the highest, except lids.
+_CEILING = 0.85
 _LEAST_PEAKS = 3  # in a performance, smallest number of peaks
 _SAME = 0.7  # ratio of the extremes of both sides: above it both get the smaller one
 _PREFIX = "CTRL_expressions."
@@ -47,10 +49,12 @@ class _Measured:
     """The measurements of a control's curve.
 
     Attributes:
-        neutral, extreme: values of the control at rest and at its extreme.
+        neutral: value of the control at rest.
+        extreme: value of the control at its extreme.
         noise: standard deviation of the noise in a frame.
         rests: whether a tenth of its values is at most _HIGHEST_REST.
-        has_ceiling: whether its peaks end at nearly the same height.
+        has_ceiling: whether it has at least three peaks and half of them end near the highest; a
+            lid only needs the three peaks.
     """
 
     neutral: float
@@ -66,7 +70,8 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
     Args:
         clip: raw controls as captured, without gain, smoothing or rescaling.
         performance: whether the take shows acting instead of one extreme after another; a control
-            is then used only if several peaks end at nearly the same height.
+            is then used only if it has at least three peaks and half of them end near the highest;
+            a lid only needs the three peaks.
         most_gain: largest gain, 1 to 4; the largest gain of lids is at least 2.
 
     Returns:
@@ -104,7 +109,13 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
 
 def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
-    """Measures a control. Args: curve: float64[frames]; rate: frames per second; name: its name."""
+    """Measures a control.
+
+    Args:
+        curve: float64[frames], values of the control.
+        rate: frames per second.
+        name: name of the control.
+    """
     calm = _without_spikes(curve, rate)
     lowest = float(np.percentile(calm, _REST_SHARE))
     neutral = min(max(lowest, 0.0), _HIGHEST_REST)

@@ -112,6 +112,9 @@ class Ranges:
     def apply(self, clip: Clip) -> Clip:
         """Rescales a clip of raw controls; other curves stay bitwise equal.
 
+        Args:
+            clip: the clip; returned itself if no curve has a range that is used.
+
         Raises:
             ArgumentError: the clip was rescaled before.
         """

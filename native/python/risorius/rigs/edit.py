@@ -53,9 +53,10 @@ def regroup(
         quaternion rotation are never removed.
 
     Raises:
-        DnaError: an inconsistent Dna; a joint that does not exist or is in two regions; a region
-            without joints; a threshold that is not a number of at least 0.
-        ValueError: an unknown joint name; a threshold that is not one or three numbers.
+        DnaError: an inconsistent Dna; a joint in two regions; a region without joints; a threshold
+            that is not a number of at least 0.
+        ValueError: an unknown joint name or index; a region that is a text; a threshold that is not
+            one or three numbers.
     """
     mm, degrees, scale = _three(threshold)
     return _regroup(

@@ -45,7 +45,8 @@ class JointControl:
     """The four raw controls that hold the rotation of one joint.
 
     Attributes:
-        joint: index of the joint; name: its name in the file.
+        joint: index of the joint.
+        name: name of the joint in the file.
         controls: indices of the raw controls of x, y, z and w.
         axes: float64[3, 3], converts a rotation's vector part from the face's axes (x to the face's
             left, y to its back, z up) to the joint's axes.
@@ -200,7 +201,8 @@ def shared(turns: Doubles, share: float) -> Doubles:
     """The fraction `share` of rotations, along the shorter way.
 
     Args:
-        turns: float64[..., 4], x, y, z, w of unit quaternions; share: 0 to 1.
+        turns: float64[..., 4], unit quaternions x, y, z, w.
+        share: the fraction, 0 to 1.
     """
     turns = np.where(turns[..., 3:] < 0.0, -turns, turns)
     sine = np.linalg.norm(turns[..., :3], axis=-1, keepdims=True)

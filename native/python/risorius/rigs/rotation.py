@@ -17,7 +17,13 @@ SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 class Convention:
     """Order, signs and unit of a file's Euler angles. Undefined values mean, as for the evaluator,
-    x y z, positive signs and degrees."""
+    x y z, positive signs and degrees.
+
+    Attributes:
+        order: the axes (0 to 2) in the order in which the rotations are applied.
+        signs: float64[3], 1 or -1, the sense of each rotation.
+        radians: radians per unit of the file's angles.
+    """
 
     def __init__(self, sequence: str, signs: tuple[int, ...], unit: str) -> None:
         known = sequence if sequence in SEQUENCES else SEQUENCES[0]

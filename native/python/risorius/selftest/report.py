@@ -14,7 +14,11 @@ def failed(rows: Iterable[Row]) -> list[Row]:
 
 
 def text(rows: Iterable[Row]) -> str:
-    """A line of text for each check, and a last line with the number of failed checks."""
+    """The report: a title, a line for each check, and a last line with the number of failed ones.
+
+    Args:
+        rows: results of the checks, at least one.
+    """
     rows = list(rows)
     bad = len(failed(rows))
     width = max(len(row.name) for row in rows)

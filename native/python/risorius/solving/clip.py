@@ -31,12 +31,16 @@ _CHUNK = 24  # number of frames that are solved in sequence, starting from the f
 _AROUND = 8  # frames before and after a chunk that are smoothed with it
 _FLOOR_MM = 0.004  # mm: smallest noise that is assumed
 _WORTH = 3.0  # price of a control in standard errors of its value
-_LEAST = 0.01  # a control whose curve has a smaller range is not used
+# A control that never differs from its initial value by more than this number is not used; if
+# `sparse` is 0, every control that differs is used.
+_LEAST = 0.01
 # lowest and highest value assumed for the typical second difference of a control's curve, at 30
 # frames per second
 _SUDDEN = (0.004, 0.5)
 _SOON = 0.1  # change of a control above which derivatives are recomputed
-_ENOUGH = 5e-4  # a smaller change of all controls ends an iteration
+# A smaller change of all controls ends an iteration. A control that never differs from its initial
+# value by more gets no curve.
+_ENOUGH = 5e-4
 
 
 class CancelledError(RisoriusError):
@@ -52,7 +56,8 @@ class SolvedClip(NamedTuple):
     frame_residual: Floats
     """float32[F]: root mean square distance of the vertices per frame, in the file's unit."""
     vertex_residual: dict[int, Floats]
-    """Mesh -> float32[V]: root mean square distance of each vertex over all frames."""
+    """Mesh -> float32[V]: root mean square distance of each vertex over all frames, in the file's
+    unit."""
     largest: float
     """Largest distance of a vertex in any frame, in the file's unit."""
     noise: float
@@ -304,8 +309,9 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
     sudden changes.
 
     A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
-    controls that differ from their initial values in some frame solved alone may change; the price
-    of a change is only job.sparse per unit of the control.
+    controls that differ from their initial values by more than _LEAST in some frame solved alone
+    may change; the price of a change is only job.sparse per unit of the control. Without such
+    controls, `curves` is returned.
 
     Args:
         job: input of the solve.

@@ -113,8 +113,8 @@ def structure(
     if own:
         found = ", ".join(sorted(own))
         raise ArgumentError(
-            f"{name}: {found} is one of its fields; only one of the two arguments was expected, "
-            "found both"
+            f"{name}: no {found} beside it was expected, found both: give the values in one of "
+            "the two"
         )
     return given
 

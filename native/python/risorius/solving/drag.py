@@ -240,11 +240,12 @@ def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
     """float64[R]: the ease of each control at dragged points, for solve_drag.
 
-    Controls of other parts of the face, which have little effect at the points beside their effect
-    elsewhere, get the ease ELSEWHERE (0.001), so that a dragged
-    brow does not turn the eyes, although turning the eyes moves the brow. The others get an ease by
-    the ratio of their effect here to their effect on the whole face, so that the brow lowers before
-    the whole face contracts, which would lower it too. The largest ease is 1.
+    Controls of other parts of the face, whose effect at the points is small compared with their
+    effect elsewhere, get the ease ELSEWHERE (0.001), so that a dragged brow does not turn the eyes,
+    although turning the eyes moves the brow. The ease of the other controls is the root of the
+    ratio of their effect at the points to their mean effect on the whole face, divided by the
+    largest such root, so that the largest ease is 1. The brow therefore lowers before the whole
+    face contracts, which would lower it too.
 
     Args:
         surface: surface of the face.

@@ -34,7 +34,7 @@ _WEAKEST = 0.01  # fraction of the strongest control's effect below which a cont
 _STILL = 1e-4  # a smaller change of all controls ends the iteration
 _GONE = 0.01  # price of a control that has already changed
 _HALVES = 5  # number of bisections between two poses
-_FEW = 2  # if more controls were selected, fewer are tried
+_FEW = 2  # superfluous controls are searched for only if more controls than this were selected
 _FREED = 4.0  # limits of a selected control during the fit, as a multiple of its selected change
 
 
@@ -199,9 +199,10 @@ def _agreeing(
 
 
 def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: float) -> Doubles:
-    """A pose with additional controls: by linear equations, it is at most `aim` mm from the
-    targets.
+    """A pose with additional controls: by linear equations, the full change brings the points to at
+    most `aim` mm from the targets, or as near as possible.
 
+    Of the full, half and quarter change the one that brings the points nearest is returned.
     Controls that have already changed have a price near 0.
 
     Args:

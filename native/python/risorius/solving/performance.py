@@ -34,13 +34,14 @@ class Performance(NamedTuple):
     """The vertex positions of one moving mesh in each frame."""
 
     frames: Floats
-    """float32[F, V, 3]: positions in each frame."""
+    """float32[F, V, 3]: positions in each frame, in the file's unit and axes, or after `fitted` in
+    the face's."""
     rate: float
-    """Frames per second of the file."""
+    """Frames per second of the file; 30 if it states none."""
     start: float
-    """Time of the first frame in seconds."""
+    """Time of the first frame in seconds; 0 for an .npz file."""
     neutral: Floats | None
-    """float32[V, 3]: the mesh at rest, or None if the file has none."""
+    """float32[V, 3]: the mesh at rest; None for an Alembic file or if an .npz file has none."""
     note: str = ""
     """A note on the alignment by `fitted`, or ""."""
 
@@ -58,7 +59,8 @@ def read_performance(
             vertex count is one of these numbers. None: any mesh fits. Not used for an .npz file.
 
     Raises:
-        PerformanceError: an unknown kind of file, a damaged file, an unknown mesh.
+        PerformanceError: an unknown kind of file, a damaged file, an unknown mesh, or a coordinate
+            that is not finite or above 1e9.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".abc", ".npz"):

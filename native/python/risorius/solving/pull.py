@@ -92,7 +92,7 @@ def make_drag(
         points: (mesh, vertex) of each of the P points.
         targets: float[P, 3], target positions in the file's unit.
         axes: float[P, k, 3], unit vectors along which distances count; None: all three axes.
-        weights: float[P], importance of each point; None: 1.
+        weights: float[P] of 0 or more, importance of each point; None: 1.
         limits: the controls that may change, and their ranges.
         sharing: how the drag is distributed over the controls.
 
@@ -203,7 +203,9 @@ def least_squares(
     low, high = drag.unknowns.limits(drag.low - begin, drag.high - begin)
     for _ in range(max(1, rounds)):
         jacobian = drag.unknowns.columns(drag.jacobian(at))
-        if price < 0:  # constant, so that a later round does not give up the gain of an earlier one
+        # The price is computed in the first round only. With another price, a later round could
+        # give up the gain of an earlier one.
+        if price < 0:
             strongest = float((jacobian**2).sum(axis=0).max(initial=0))
             price = max(smallest**2 * strongest, 1e-20)
         here = drag.unknowns.values(at - begin)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from .surface import Doubles
 
-_REST, _MOVES, _BOUND = 0, 1, 2  # states of an unknown: 0, moving, at a bound
+_REST, _MOVES, _BOUND = 0, 1, 2  # states of an unknown: at the value 0, moving, at a bound
 _MOST_STEPS = 600  # largest number of steps of a path
 # largest number of path steps in cheapest_to(); the result of a longer path is not sparse
 _MOST_MORE = 60
@@ -27,7 +27,8 @@ _FAR = 0.1  # fraction of the first residual: a target that stays farther away i
 # fraction of the possible gain that may be given up to use fewer controls, if the target is out of
 # reach
 _LITTLE = 0.1
-_CALM = 0.12  # fraction of the first price below which controls hardly help, for such a target
+# fraction of the first price below which controls hardly help, if the target is out of reach
+_CALM = 0.12
 _LEVEL = 1e-9  # smaller differences of slopes count as none
 
 
@@ -198,7 +199,8 @@ def cheapest_change(
         # The target is out of reach: controls that hardly help are left out.
         there = _at_price(nodes, prices, calm)
         aim = max(aim, there) if there - near <= _LITTLE * (way - near) else aim
-    return np.clip(_where(nodes, aim) / price, low, high)  # because of rounding errors
+    # Rounding errors could leave the bounds.
+    return np.clip(_where(nodes, aim) / price, low, high)
 
 
 def cheapest_to(

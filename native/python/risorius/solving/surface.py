@@ -118,8 +118,8 @@ class Surface:
         return probe.jacobian()
 
     def strongest(self) -> Doubles:
-        """float64[R]: largest displacement of a vertex from the neutral pose, per unit of each
-        control.
+        """float64[R]: largest displacement of a vertex from the pose with all controls at 0, per
+        unit of each control, in the file's unit.
 
         The displacements are measured once, for about two thousand vertices spread evenly over the
         meshes of the LOD.
@@ -128,13 +128,13 @@ class Surface:
 
     def spread(self) -> Doubles:
         """float64[R]: root mean square displacement of the vertices that strongest() measures, per
-        unit of each control."""
+        unit of each control, in the file's unit."""
         far = self._far()
         return np.asarray(np.sqrt(np.square(far).sum(axis=0) / max(1, len(far))))
 
     def _far(self) -> Doubles:
-        """float64[V, R]: how far each of about two thousand vertices moves per unit of each
-        control."""
+        """float64[V, R]: displacement of each of about two thousand vertices per unit of each
+        control, in the file's unit."""
         if self._moved is None:
             count = self.control_count
             every = max(1, sum(self.vertex_counts[m] for m in self.mesh_indices) // _LOOKED_AT)

@@ -81,10 +81,11 @@ def speak(
         cancel: called repeatedly; if it returns true, CancelledError is raised.
 
     Returns:
-        A clip of raw controls and head.pitch, from the beginning of the sound to 0.3 s after its
-        end. Values of its events "word" and "phoneme" are the word or phoneme. Metadata: source,
-        transcript, speech ("aligned" or "recognised"), notes about deviations; if correctable also
-        seconds (duration of the sound) and openness (integers, in thousandths).
+        A clip of raw controls and, with accents, of head.pitch (radians), from the beginning of
+        the sound to 0.3 s after its end. Values of its events "word" and "phoneme" are the word or
+        phoneme. Metadata: source, speech ("aligned" or "recognised"), transcript if given, notes
+        about deviations if there are any; if correctable also seconds (duration of the sound) and
+        openness (integers, in thousandths).
 
     Raises:
         AudioError: an unusable file. ValueError: a transcript without English words, a rate or an

@@ -41,7 +41,7 @@ from .listening import Cancel, CancelledError, Progress
 from .recogniser import MissingError
 
 _PATIENCE = 3600.0  # seconds without a message until an error; a long voice is aligned in one step
-_ASKED = 0.05  # seconds between two calls of cancel
+_ASKED = 0.05  # seconds: longest time between two calls of cancel
 _BEGIN = (
     "import json, sys; task = json.loads(sys.stdin.buffer.readline()); sys.path[:] = task['paths'];"
     "from risorius.speech import apart; apart.serve(task)"

@@ -23,9 +23,10 @@ RATE = 16000
 
 _LOWEST_RATE, _HIGHEST_RATE = 4000, 768000
 _MOST_CHANNELS = 64
-_MOST_BYTES = 2**31  # limit of a file: three hours of stereo at 48 kHz and 32 bit
+_MOST_BYTES = 2**31  # limit of a file: 1.5 hours of stereo at 48 kHz and 32 bit
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
-_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # values in the size fields of programs that write to a pipe
+# Values in the size fields of a WAV file whose program wrote to a pipe and did not know the size.
+_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)
 
 
 class AudioError(RisoriusError):
@@ -229,7 +230,7 @@ def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
     divisor = int(np.gcd(source, target))
     up, down = target // divisor, source // divisor
     count = -(-len(samples) * up // down)
-    band = 0.955 * min(1.0, target / source)  # as a fraction of the source's band
+    band = 0.955 * min(1.0, target / source)  # highest frequency / (source / 2)
     reach = int(np.ceil(56.0 / band))  # samples of the source on each side of the filter
     padded = np.concatenate([np.zeros(reach, np.float32), samples, np.zeros(reach + 1, np.float32)])
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)

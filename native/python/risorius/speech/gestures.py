@@ -77,12 +77,16 @@ def blinks(times: Times, begins: Sequence[float]) -> dict[str, Curves]:
 
 
 def accent_curves(times: Times, found: Sequence[Accent], intensity: float) -> dict[str, Curves]:
-    """Control -> float64[frames]: brows and nods that follow stressed syllables.
+    """Curves of brows and nods that follow stressed syllables.
 
     Args:
         times: float64[frames], seconds.
         found: the stressed syllables.
         intensity: factor on all movements; 1 is usual, 0 moves nothing.
+
+    Returns:
+        Raw control of a brow -> float64[frames] in [0, 1]; "head.pitch" -> float64[frames],
+        radians, negative for down.
     """
     brows, nod = np.zeros(len(times)), np.zeros(len(times))
     for accent in found:

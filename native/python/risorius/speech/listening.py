@@ -23,7 +23,8 @@ STEP = 0.01
 """Seconds between two values of a loudness curve."""
 
 _PIECE = 12.0  # seconds: smallest length of a piece, if pauses allow it
-_LONGEST_PIECE = 30.0  # seconds; limits the memory of the decoder
+# Seconds: longest piece of `pieces`, to limit the decoder's memory; aligned pieces may be longer.
+_LONGEST_PIECE = 30.0
 _PAUSE = 0.15  # seconds: shortest silence in which the voice may be cut
 _SHORTEST_SILENCE = 0.08  # seconds: shorter silences are not removed from phonemes
 _SHORTEST_PHONEME = 0.03  # seconds: shortest length of a phoneme
@@ -54,7 +55,8 @@ class Heard(NamedTuple):
     samples: Samples
     """float32[n] at audio.RATE samples per second."""
     aligned: bool
-    """Whether the phonemes were aligned from the transcript, and not recognised."""
+    """True: the phonemes come from the transcript, or were given to `follow`; gaps and pieces that
+    cannot be aligned are recognised nevertheless. False: all are recognised, or nobody speaks."""
     notes: list[str]
     """Sentences about deviations, such as words of the transcript that were not heard."""
 
@@ -118,7 +120,8 @@ def follow(path: str | os.PathLike[str], found: Sequence[Phoneme]) -> Heard:
         found: phonemes in order; gaps become silence.
 
     Raises:
-        AudioError: an unusable file. ArgumentError: a phoneme begins after the end of the sound.
+        AudioError: an unusable file. ArgumentError: a phoneme other than silence begins after the
+            end of the sound.
     """
     samples = resample(*read_audio(path))
     duration = len(samples) / RATE
@@ -147,8 +150,8 @@ def _aligned(
 ) -> list[Phoneme] | None:
     """The transcript's phonemes with times, or None if too few of its words are heard.
 
-    Between the words of the transcript, and in pieces where the alignment of phonemes fails, the
-    phonemes are recognised.
+    Phonemes are recognised in pieces where the alignment of phonemes fails and, if the words of
+    the transcript do not match the voice exactly, in the gaps between the words that are heard.
 
     Args:
         recogniser: decoders.
@@ -261,7 +264,9 @@ def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[s
 def _word_pieces(
     segments: Sequence[Segment], duration: float
 ) -> Iterator[tuple[float, float, list[str]]]:
-    """(begin, end, words) of each piece; pieces are cut in pauses and cover the whole duration.
+    """(begin, end, words) of each piece, in seconds; pieces are cut in the middle of pauses.
+
+    They cover the whole duration, or end in the middle of the last pause if no word follows it.
 
     Args:
         segments: all words with times, and silences between them.

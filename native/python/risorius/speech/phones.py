@@ -23,7 +23,7 @@ class Phoneme(NamedTuple):
     """Phoneme of the CMU dictionary, without stress: AA, B, ... ZH; SIL for silence."""
     confidence: float = 1.0
     """0 to 1. Aligned: fraction of its duration in which a decoder of phonemes hears the same
-    viseme. Recognised by vote: mean share of the votes for its viseme."""
+    viseme. Recognised by vote: mean share of the votes for its viseme. Read from a file: 1."""
     word: str = ""
     """The word that begins with this phoneme, or ""; it ends before the next word or SIL."""
 

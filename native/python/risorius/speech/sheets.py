@@ -98,12 +98,15 @@ def textgrid(found: Sequence[Phoneme]) -> str:
 def read(data: bytes, name: str) -> list[Phoneme]:
     """Reads the phonemes of a file in either format, in order; gaps between them mean silence.
 
+    The confidence of each phoneme is 1, because a column of confidences is not read.
+
     Args:
         data: content of the file in UTF-8, or in UTF-16 with a byte order mark.
         name: the file's name in errors.
 
     Raises:
-        SheetError: another format, times that do not ascend, an unknown phoneme.
+        SheetError: another format or encoding, times that do not ascend, an unknown phoneme, or no
+            phoneme but silence.
     """
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:

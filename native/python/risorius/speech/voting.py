@@ -22,7 +22,7 @@ Votes = npt.NDArray[np.float64]
 
 _SPEEDS = (0.95, 1.0, 1.05)
 _WORD_VOTE, _PHONE_VOTE = 1.2, 1.0
-_MAJORITY = 0.01  # additional vote at the voice's own speed, to break ties
+_MAJORITY = 0.01  # additional vote of the decoder of phonemes at speed 1, to break ties
 _SHORTEST = 3  # smallest number of frames of a phoneme
 
 _PHONES = tuple(CLASS_OF)
@@ -100,7 +100,9 @@ def _runs(best: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
 
 
 def _with_words(found: list[Phoneme], words: Sequence[Segment]) -> list[Phoneme]:
-    """Sets each word at the phoneme that begins nearest to it, at most one word per phoneme.
+    """Sets each word at the phoneme that begins nearest to it.
+
+    A word is dropped if an earlier word of the list is at this phoneme, or if all is silence.
 
     Args:
         found: phonemes; changed.

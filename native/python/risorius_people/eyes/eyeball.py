@@ -26,7 +26,7 @@ CONVERGENCE = 1.2  # degrees by which each eye turns inwards, to look at a point
 # Angle in radians between the gaze and the limbus (the iris' outer edge), seen from the ball's
 # middle.
 _LIMBUS = float(np.arcsin(IRIS))
-_EDGE = _LIMBUS + 0.22  # angle in radians at which the cornea's shell sinks into the ball
+_EDGE = _LIMBUS + 0.22  # radians from the gaze at which the cornea's shell sinks into the ball
 _SOFT = 0.012  # width of the blend between cornea and ball, in radii of the ball
 _CLEAR = 0.0015  # gap between the cornea's shell and the ball, in radii of the ball
 # Positions of the iris' rings, from the rim of the pupil (0) to the root of the iris (1). _ROOT,
@@ -34,7 +34,7 @@ _CLEAR = 0.0015  # gap between the cornea's shell and the ball, in radii of the 
 # limbus, in radii of the iris.
 _IRIS_RINGS = np.array([0.0, 0.06, 0.16, 0.28, 0.42, 0.56, 0.70, 0.83, 0.93, 1.0])
 _ROOT, _MIDDLE, _RIM = 0.05, 0.13, 0.09
-_HOLE = 0.28  # depth of the pupil behind the iris, in radii of the iris
+_HOLE = 0.28  # depth of the pupil's bottom behind the pupil's rim, in radii of the iris
 _BEHIND = np.array(
     [0.02, 0.06, 0.11, 0.17, 0.25, 0.35, 0.47, 0.60, 0.75, 0.92, 1.12, 1.4, 1.8, 2.25]
 )

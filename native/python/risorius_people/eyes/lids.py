@@ -21,6 +21,9 @@ _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 # Fractions of the rim's displacement by which the eight rings (OUTER) outside the rim move, the
 # nearest first.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
+# Fraction of the data's blink by which the skin around the lids moves. The lids' own fraction
+# depends on how far the data's lids are shut, which the rest pose does not show.
+_AROUND = 0.55
 _STEPS = 10  # iterations that lay the rim on the eye
 # mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
 # round the ball, so without this distance they would be inside the ball at half of the look.
@@ -44,7 +47,7 @@ _NOT_CLOSED = [
     "eyeCheekRaise",
     "eyeUpperLidUp",
 ]
-WIDER = 0.75  # factor on the data's displacement, which starts with half-shut lids
+WIDER = 0.75  # factor on the data's eyeWiden displacement, which starts with half-shut lids
 # mm: offset of the ball to the front from the data's ball, and largest offset up or down
 _FORWARD, _ASIDE = 1.5, 1.2
 _RADIUS = 14.0  # mm: radius of the man's ball, for which the lengths above are given
@@ -104,12 +107,13 @@ class Lids:
         return np.asarray(values[self.rings])
 
     def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
-        """float64[13, COLUMNS, 3]: a grid whose rim touches the eye; skin around the rim follows.
+        """float64[13, COLUMNS, 3]: a grid with its rim at the distances _HEIGHTS from the eye. The
+        skin around the rim follows, and stays at least 0.9 mm (on the man) outside of the eye.
 
         Args:
             grid: float64[13, COLUMNS, 3], positions of the rings.
             turn: float64[3, 3], rotation of the eye from its rest pose; None: no rotation.
-            lift: mm that are added to the rim's distances from the eye's surface, _HEIGHTS.
+            lift: mm that are added to the distances _HEIGHTS, for the man's ball.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
@@ -150,7 +154,7 @@ class Lids:
 def place_ball(
     positions: Floats, groups: dict[str, Ints], rings: Ints, side: str
 ) -> tuple[Floats, float]:
-    """The middle and radius of the ball that fits the data's lids.
+    """The middle and radius, in decimetres, of the ball that fits the data's lids.
 
     Args:
         positions: float64[V, 3] of a person, in decimetres.
@@ -177,7 +181,7 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
         widen: float64[V, 3], the data's displacement that widens the eye.
 
     Returns:
-        The part of `widen` that was added, float64[V, 3].
+        The multiple of `widen` that was added, float64[V, 3]; negative if the lids were too open.
     """
     iris = IRIS * lids.radius
     edge = smoothed(lids.grid(lids.rest))[ROOT + 2] - lids.middle
@@ -232,8 +236,9 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     """Two displacements from the rest pose that close the lids, float64[V, 3] each.
 
-    The first lays both lids on one line. The second is the data's displacement, shortened because
-    it would move the upper lid past the lower lid.
+    The first lays both lids on one line. The second is the data's displacement, scaled in each
+    column of the grid by 0.2 to 1.2 so that the upper lid ends at the lower lid. Outside the grid
+    both are equal.
 
     Args:
         lids: the lids in their rest pose.
@@ -248,7 +253,9 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
             before[ROOT + 2, column], way[ROOT + 2, column], closed[ROOT + 2, edge]
         )
     share = _even(share, np.abs(way[ROOT + 2, :, 1]) > 2 * MM)
-    whole = before + share[:, None] * way
+    rows = np.ones((len(closed), 1))
+    rows[:ROOT, 0] = np.linspace(0, 1, ROOT) ** 2
+    whole = before + (_AROUND + rows * (share - _AROUND))[:, :, None] * way
     for row in range(ROOT, ROOT + 4):
         x = whole[row, UPPER, 0]
         line = closed[row, edge]
@@ -259,9 +266,10 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     off = closed[ROOT, UPPER] - whole[ROOT, UPPER]
     outer = whole[:ROOT, UPPER] + _FADE[::-1, None, None] * off
     closed[:ROOT, UPPER] = outer
+    closed[:, LOWER] += (_AROUND * (1 - rows))[:, :, None] * way[:, LOWER]
     closed[ROOT + 4, UPPER] = whole[ROOT + 4, UPPER]
     closed = lids.seated(closed)
-    plain = _scaled(lids, blink, share)
+    plain = _scaled(lids, blink)
     out = plain.copy()
     out[lids.rings] = closed - lids.grid(lids.rest)
     return out, plain
@@ -269,6 +277,8 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
 
 def _meeting(start: Floats, way: Floats, line: Floats) -> float:
     """The fraction of a displacement at which a point is as low as a line at the point's x.
+
+    The fraction may exceed 1. It is 0 for a displacement without height.
 
     Args:
         start: float64[3], the point.
@@ -303,7 +313,7 @@ def _even(share: Floats, known: Floats) -> Floats:
     return np.asarray((np.roll(out, 1) + 2 * out + np.roll(out, -1)) / 4)
 
 
-def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
+def _scaled(lids: Lids, blink: Floats) -> Floats:
     """float64[V, 3]: the shortened blink from the rest pose, for skin outside the grid.
 
     The returned displacement also undoes the one that opened the lids to their rest pose.
@@ -311,15 +321,9 @@ def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
     Args:
         lids: the lids in their rest pose.
         blink: float64[V, 3], the data's displacement.
-        share: float64[COLUMNS], the fraction of `blink` that is used.
     """
-    out = np.zeros_like(blink)
-    moved = np.flatnonzero(np.abs(blink).max(axis=1) > 1e-7)
-    ring = lids.raw[lids.rings[0]]
-    near = np.linalg.norm(lids.raw[moved][:, None] - ring[None], axis=2).argmin(axis=1)
-    out[moved] = share[near][:, None] * blink[moved]
     same_side = np.sign(lids.raw[:, 0]) == np.sign(lids.middle[0])
-    return out - np.where(same_side[:, None], lids.rest - lids.raw, 0.0)
+    return _AROUND * blink - np.where(same_side[:, None], lids.rest - lids.raw, 0.0)
 
 
 def between(lids: Lids, way: Floats) -> Floats:

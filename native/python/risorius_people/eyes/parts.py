@@ -27,7 +27,7 @@ _MOUND = (
     (4, 2.25, 0.04),
     (4, 2.7, -0.15),
 )
-_APART = 0.12  # share of the neighbouring column at the corner
+_APART = 0.12  # weight of the neighbouring column in the caruncle's vertices at the eye's corner
 Row = dict[int, float]  # vertex of the base mesh -> weight; the weights of a row sum to 1
 
 
@@ -163,7 +163,8 @@ def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
             brow inward.
 
     Returns:
-        Vertices, faces and texture coordinates, as from _tears.
+        Vertices as weights of the base mesh's vertices, faces, and texture coordinates
+        float64[vertices, 2].
     """
     rows: list[Row] = []
     for aside, at, high in _MOUND:

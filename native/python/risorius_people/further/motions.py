@@ -144,7 +144,8 @@ def _root(points: Floats, share: Floats, begin: float) -> Floats:
 
 
 def _tongue_way(places: Places, by: object) -> Floats:
-    """Shifts the tongue by the vector `by`; towards the root the shift falls to 0."""
+    """Shifts the tongue along the vector `by`; towards the root the shift falls to 0. The row's
+    `size` sets the length of the largest displacement."""
     _, _, share = _on_tongue(places)
     return _of_tongue(places, smooth_step(share / 0.6)[:, None] * _vector(by))
 
@@ -161,7 +162,8 @@ def _tongue_rotation(power: float, begin: float) -> Motion:
 
 
 def _tongue_scale(places: Places, by: object) -> Floats:
-    """Scales the tongue's width and height; its root stays."""
+    """Scales the tongue's width and height about its middle; its root stays. `by` has the fraction
+    by which each axis grows, negative to shrink."""
     _, points, share = _on_tongue(places)
     middle = np.zeros_like(points)
     for at in np.unique(share.round(2)):

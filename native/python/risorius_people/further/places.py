@@ -14,7 +14,9 @@ from ..source import BaseMesh
 
 MM = 0.01  # decimetres per millimetre
 _TOUCHING = 0.03  # decimetres: largest distance of a lip vertex from the other lip
-_PARTED = 0.04  # decimetres: smallest distance that the opening jaw adds
+# decimetres: smallest difference between the displacements of two touching lip vertices if the jaw
+# opens
+_PARTED = 0.04
 _BETWEEN = 0.03  # decimetres: width of the blend between the lips at the corners
 _LID = 0.035  # decimetres: reach of a lid's skin from the roots of its lashes
 _CHUNK = 256  # points whose distances are computed together
@@ -60,7 +62,8 @@ class Places:
         normals: float64[V, 3], unit normals.
         groups: name of a group of the base mesh -> vertex indices.
         skin: float64[V], 1 for vertices of the body's skin, else 0.
-        lips: "U" or "D" -> float64[V], weight of the upper or lower lip.
+        lips: "U" or "D" -> float64[V], 1 for all vertices above or below the line between the lips,
+            with a soft edge; the sum is 1.
         along: float64[V], 0 in the middle of the lips, 1 and -1 at their corners.
         lip_distance: float64[V], distance from the line along which the lips touch.
         lids: "U" or "D" -> float64[V], weight of the upper or lower lids of both eyes, with lashes.

@@ -58,7 +58,8 @@ def further_units(
 ) -> tuple[dict[str, Floats], dict[tuple[str, str], Floats]]:
     """The displacements of further.toml in decimetres.
 
-    Returns raw control -> float64[V, 3], and for correctives two raw controls -> float64[V, 3].
+    Returns raw control -> float64[V, 3], and for correctives two raw controls -> float64[V, 3]. The
+    displacement of a row with the key `with` is a corrective, and its control alone moves nothing.
 
     Args:
         source: the data with the shapes.
@@ -128,7 +129,12 @@ def _ways(
 
 
 def _weight(places: Places, keys: Mapping[str, Any]) -> Floats:
-    """float64[V]: weights of a row's displacement."""
+    """float64[V]: weights of a row's displacement: the product of the areas that its keys name.
+
+    Args:
+        places: regions of the face.
+        keys: keys of the row in further.toml.
+    """
     out = np.ones(len(places.positions))
     if "lip" in keys:
         out *= places.lips[keys["lip"]]

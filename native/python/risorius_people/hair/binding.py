@@ -40,7 +40,8 @@ def head_of(dna: Dna, lod: int) -> Mesh | None:
 
 
 def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
-    """int64[T, 3], vertices of triangles; int64[V, n], numbers of the triangles at each vertex."""
+    """int64[T, 3], vertices of the triangles into which a mesh's polygons are split; int64[V, n],
+    indices of the triangles at each vertex, where a short row repeats its last one."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
     sizes = np.diff(offsets)

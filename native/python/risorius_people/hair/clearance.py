@@ -26,7 +26,9 @@ from .surface import Roots, Surface, about, nearest_places, nearest_rows
 
 _NEAR = 0.3  # decimetres: skin further than this from every hair is ignored
 _SOME = 256  # number of hair points that determine which skin is near
-_LOW = 0.002  # decimetres: smallest height of an end above the skin, or its neutral height
+# decimetres: smallest allowed height of a hair's edges above the skin, except at the root; edges
+# that are lower in the neutral pose may be as low in other poses
+_LOW = 0.002
 _DEEPER = 0.002  # decimetres by which a root in the skin may be deeper than in the neutral pose
 # decimetres: a control that moves no skin farther than this cannot bring a hair into the skin
 _STILL = 0.002
@@ -57,7 +59,12 @@ def narrow_edges(strips: Strips, surface: Surface) -> None:
 
 
 def _depths(points: Floats, surface: Surface) -> Floats:
-    """float64[...]: depth of points below the nearest skin. Args: points: float64[..., 3]."""
+    """float64[...]: depth of points below the nearest skin, negative above the skin.
+
+    Args:
+        points: float64[..., 3], in decimetres.
+        surface: the head with the skin.
+    """
     flat = points.reshape(-1, 3)
     places = surface.nearest(flat)
     normals = unit_vectors(places.of(surface.normals))
@@ -68,7 +75,7 @@ def _depths(points: Floats, surface: Surface) -> Floats:
 def cut_clear(
     strips: Strips, dna: Dna, head: Mesh, unit: float, faces: Iterable[NDArray[np.float32]]
 ) -> Strips:
-    """Shortens or drops hairs that would go through the skin, and returns the others.
+    """Shortens or drops hairs that would go through the skin; returns all hairs that remain.
 
     Args:
         strips: hair in decimetres, of which only the roots follow the skin; changed.

@@ -33,7 +33,8 @@ def _turned(vectors: Floats, normals: Floats, angles: Floats) -> Floats:
 def brow_flow(surface: Surface) -> Floats:
     """float64[V, 3]: direction of brow hairs, upright at the nose, flat at the temple.
 
-    Hairs below the middle line rise towards it and hairs above descend, so that they form a ridge.
+    Hairs below the middle line rise more steeply than hairs above it, which descend in the outer
+    half of the brow; so the hairs form a ridge.
 
     Args:
         surface: surface of the head.
@@ -59,7 +60,7 @@ def brows(surface: Surface, person: Person) -> Strips:
 
     Args:
         surface: surface of the head.
-        person: the person; brows of children and women are shorter, those of old men longer.
+        person: the person; hairs of children and women are shorter, hairs of old people longer.
     """
     random = np.random.default_rng(21)
     front = surface.man_normals[:, 2] > 0.1  # excludes the inside of the eye socket

@@ -39,7 +39,8 @@ def grow(
         rise: (float64[n], float64[n]), angle above the skin at the root and at the tip, in radians.
         rows: number of points of a guide.
         among: indices of vertices that the guides may come near.
-        least: float64[n] or a number, smallest height of a tip above the skin in decimetres.
+        least: float64[n] or a number, smallest height of a guide above the skin in decimetres; it
+            rises from 0 at the root to this value at a third of the length.
         stiff: weight of the previous direction in each step, 0 to 1.
         fall: float64[n] or a number, weight of gravity at the tip.
         hug: weight of the pull back to the skin on guides that are above the lobes of the ears.

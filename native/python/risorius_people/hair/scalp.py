@@ -218,7 +218,8 @@ def long(surface: Surface, person: Person) -> Strips:
 
     Args:
         surface: surface of the head.
-        person: the person; `hair_length` is a factor on the usual length.
+        person: the person; `hair_length` is a factor on the usual length, and `hair_fringe` above 0
+            adds a fringe.
     """
     random = np.random.default_rng(34)
     roots, inside = _roots(surface, 0.066, random, "long", fine=1.0)
@@ -332,7 +333,8 @@ def parted_flow(surface: Surface) -> Floats:
     return tangent(flow, surface.normals)
 
 
-_KNOT = np.array([0.0, 0.46, -1.72])  # position of the bun on the man's head
+# Position of the bun, in decimetres on the man's head as in Surface.man.
+_KNOT = np.array([0.0, 0.46, -1.72])
 
 
 def bun(surface: Surface, person: Person) -> Strips:
@@ -352,7 +354,8 @@ def bun(surface: Surface, person: Person) -> Strips:
     sway = 0.05 * random.normal(0, 1, (n, 3))
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    full = smooth_step(man[:, 1] / 0.4)  # 1 over forehead and temples, where hair is loose
+    # from 0 at the height of the eyes to 1 at 0.4 dm above them, where hair is loose
+    full = smooth_step(man[:, 1] / 0.4)
     rise = np.radians(random.uniform(3, 9, n) + 9 * full), np.zeros(n)
     above = _scalp_vertices(surface)
     least = (0.004 + 0.035 * full + (0.014 + 0.02 * full) * random.random(n)) * surface.scale

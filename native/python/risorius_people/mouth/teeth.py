@@ -48,9 +48,10 @@ LOWER = (
     Tooth("molar", 11.0, 10.2, 7.3),
     Tooth("molar", 10.4, 10.0, 6.9),
 )
-# At each height (0 at the edge, 1 at the gum, above 1 in the root): fraction of half the width,
-# fraction of half the thickness, and offset of the lip side in mm.
+# Heights of the rows of a crown: 0 at the edge, 1 at the gum, above 1 in the root.
 _HEIGHTS = (0.0, 0.05, 0.16, 0.38, 0.66, 0.88, 1.02, 1.25)
+# Kind of tooth -> at each of these heights: fraction of half the width, fraction of half the
+# thickness, and offset of the lip side in mm.
 _PROFILES = {
     "incisor": (
         (0.84, 0.93, 0.98, 1.0, 0.94, 0.86, 0.8, 0.72),
@@ -71,7 +72,8 @@ _PROFILES = {
 # Rows of the gum on the side of the lip: mm from the gum's margin away from the biting edge.
 _GUM_HEIGHTS = (-0.15, 0.25, 1.0, 2.6, 5.2, 7.2)
 _GUM_OUT = (-0.9, 0.1, 0.4, 0.45, 0.0, -2.6)  # mm outside the crown's lip side
-_PALATE_HEIGHTS = (-0.2, 0.3, 1.6, 4.2)  # the same on the side of the tongue
+# Rows of the gum on the side of the tongue: mm from the gum's margin away from the biting edge.
+_PALATE_HEIGHTS = (-0.2, 0.3, 1.6, 4.2)
 _PALATE_IN = (0.9, -0.2, -1.6, -6.0)
 
 

@@ -26,6 +26,9 @@ def over_lip(
 ) -> dict[tuple[str, str], Floats]:
     """Two raw controls -> float64[V, 3]: displacements that lift the tongue with the lower lip.
 
+    One of the two controls is tongueOut. The other control lifts the lip, or is jawOpen, with which
+    the tongue rises by a constant.
+
     Args:
         units: raw control -> float64[V, 3], its displacement.
         positions: float64[V, 3] of a person.

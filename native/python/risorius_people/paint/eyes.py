@@ -163,8 +163,8 @@ def _sclera(angle: Floats, aside: Floats, random: np.random.Generator) -> Floats
 
 
 def vessels(random: np.random.Generator) -> Floats:
-    """float64[EYE_SIZE, EYE_SIZE], 0 to 1: fine blood vessels that wander in from behind, fork and
-    thin out.
+    """float64[EYE_SIZE, EYE_SIZE], 0 to 1: fine blood vessels that run from the back of the ball
+    towards the iris, fork and thin out.
 
     Args:
         random: generator of their paths.

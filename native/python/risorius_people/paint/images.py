@@ -38,7 +38,8 @@ def enlarged(image: Floats, side: int) -> Floats:
 
 
 def smooth(low: float, high: float, x: Floats) -> Floats:
-    """0 for x up to low, 1 for x from high on, and smooth between them."""
+    """0 where x is `low`, 1 where x is `high`, smooth between them, and constant beyond; falls with
+    x if `low` is above `high`."""
     return smooth_step((x - low) / (high - low))
 
 

@@ -21,7 +21,7 @@ _DOWN = (0.63, 0.25, 1.45)
 
 
 def islands(polygons: Polygons) -> Ints:
-    """int[T]: number of each texture coordinate's island; the largest island is 0.
+    """int[T]: number of each texture coordinate's island; island 0 has the most coordinates.
 
     Args:
         polygons: mesh with texture coordinates.

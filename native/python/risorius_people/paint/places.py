@@ -36,7 +36,7 @@ _LINE = np.array(
         (0.90, 0.74),
     ]
 )
-HAIRLINES = {  # style -> (recession, sideburn, low), see hairline_height
+HAIRLINES = {  # style -> the arguments recession, sideburn and low of hairline_height, 0 to 1
     "none": (0.0, 1.0, 0.0),
     "crop": (0.0, 1.0, 0.0),
     "receding": (0.75, 1.0, 0.0),
@@ -55,7 +55,7 @@ def wavy(points: Floats, random: np.random.Generator, waves: float, count: int =
         points: float64[n, 3], in decimetres.
         random: generator of the noise.
         waves: number of waves per decimetre.
-        count: number of waves that are added.
+        count: number of sine waves in random directions whose sum is the noise.
     """
     ways = random.normal(0, 1, (count, 3))
     ways *= 2 * np.pi * waves / np.linalg.norm(ways, axis=1, keepdims=True)

@@ -23,7 +23,9 @@ FAR_RINGS = 14.0  # largest number of edge loops that are counted
 # number of the base mesh's edge loops from the inside of the mouth to the outer rim of the lips
 LIPS_RINGS = 8.0
 DIVIDED = 2.0  # an edge of the base mesh is divided into this many edges of the head at LOD 0
-_REACH = 0.12  # decimetres: size of the spots of the noise in fields
+# decimetres: size of the spots of the finest of the three noises; the others have spots 1.6 and 2.6
+# times as large
+_REACH = 0.12
 
 
 @dataclass
@@ -34,10 +36,12 @@ class Face:
         x: float64[V], to the side; the character's left is positive.
         y: float64[V], up.
         z: float64[V], to the front.
-        lids: float64[V], motion of a vertex in a blink, as a fraction of the largest, 0 to 1.
+        lids: float64[V], mask of the lids: 0 for vertices that a blink moves by at most a tenth of
+            its largest displacement, 1 from 8 tenths on, and smooth between them.
         mouth: float64[V], number of the base mesh's edge loops from the inside of the mouth, which
-            is an island of the texture; negative inside.
-        eyes: float64[V], number of edge loops from the skin behind the lids; negative there.
+            is an island of the texture; negative inside; limited to 14 and -14.
+        eyes: float64[V], number of edge loops from the skin behind the lids; negative there;
+            limited to 14 and -14.
         uneven: float64[V, 3], three noises with mean 0 and standard deviation about 1, equal on
             both sides of texture seams.
     """

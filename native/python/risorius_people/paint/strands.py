@@ -12,8 +12,8 @@ from ..polygons import Floats
 from .atlas import ATLAS_SIZE, DENSE, TILES
 
 _GREY = (0.74, 0.73, 0.71)
-_LASH_DARK = 0.3  # factor on the brows' colour, which gives that of the lashes
-_LOOSE = 0.6  # see _Hairs.loose
+_LASH_DARK = 0.3  # the lashes' colour is the brows' colour multiplied by this
+_LOOSE = 0.6  # _Hairs.loose of the beard's tiles and of the thin tiles of straight scalp hair
 _CURLY = 0.6  # hair_curl above which single hairs are not visible
 
 
@@ -56,7 +56,8 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
     wave, waves = 0.16 * curl, 1.5 + 7.0 * curl
     long = person.hair_style in ("long", "bun")
     length = (0.75, 1.0) if long else (0.5, 1.0)
-    begin = {"long": 0.05, "bun": 0.1}.get(person.hair_style, 0.3)  # a centimetre or less
+    # roots are at most about a centimetre above the lower edge of the card
+    begin = {"long": 0.05, "bun": 0.1}.get(person.hair_style, 0.3)
     scalp = (74, 68, 61, 70, 64, 32, 24, 16) if straight else (34, 31, 28, 33, 30, 17, 13, 9)
     return {
         "scalp": _Hairs(

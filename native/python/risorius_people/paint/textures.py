@@ -258,9 +258,9 @@ def paint_textures(
 def packable(name: str, image: Floats, largest: int) -> Floats:
     """A texture at the size and precision in which it is stored.
 
-    Textures of eyes get half the side. Textures up to 1024 x 1024 are part of the released zip:
-    head and eyes keep 7 of 8 bits, the head's roughness 6, because the lower bits are noise, which
-    PNG cannot compress.
+    Textures of eyes have at most half of this side. If `largest` is at most 1024, as for the
+    released zip, head and eyes keep 7 of 8 bits, the head's roughness 6, because the lower bits are
+    noise, which PNG cannot compress.
 
     Args:
         name: file name of the texture.

@@ -61,7 +61,7 @@ def take_up(hand: Hand) -> None:
 
 
 def put_down(hand: Hand) -> None:
-    """Click on the button of take_up() again, which returns to the previous tool."""
+    """Click on the button of the drag tool again, which returns to the previous tool."""
     scroll(hand, -40)
     hand.click(*hand.find(r"risorius\.drag_tool"))
     hand.wait("the tool is put down", lambda: not hand.ask("drags"))
@@ -115,7 +115,7 @@ def open_section(hand: Hand, *panels: str) -> None:
 
 
 def need_section(hand: Hand, panel: str) -> None:
-    """Open a section of the tab if it is closed. Args: panel  class name of the section."""
+    """Open the section of the tab with the class name `panel` if it is closed."""
     scroll(hand, -40)
     hand.ask("watch", panel=panel)
     hand.ask("draw_again", panel=panel)
@@ -143,7 +143,7 @@ def _opened(hand: Hand, panel: str) -> bool:
 
 
 def scroll(hand: Hand, notches: int = 25) -> None:
-    """Turn the wheel over the sidebar. Args: notches  steps down; negative values go up."""
+    """Turn the wheel over the sidebar by `notches` steps down; negative values go up."""
     left, top, width, height = hand.ask("layout")["sidebar"]
     hand.move(left + width - 40, top + height / 2)
     hand.wheel(notches)

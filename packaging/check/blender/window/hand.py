@@ -29,6 +29,7 @@ class LateError(Exception):
 
 class Hand:
     """Moves the pointer, presses keys and takes pictures; calls functions of inside.py in Blender.
+    Places are pixels of the screen from its upper left corner.
 
     Attributes:
         talk: folder of the files by which functions of inside.py are called.
@@ -139,7 +140,7 @@ class Hand:
         self.ask("ready")
 
     def wheel(self, notches: int) -> None:
-        """Turn the wheel. Args: notches  steps down; negative values go up."""
+        """Turn the wheel by `notches` steps down; negative values go up."""
         self.do("click", "--repeat", abs(notches), "--delay", 12, 5 if notches > 0 else 4)
         self.ask("ready")
 

@@ -22,7 +22,7 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 
 _EVENED = 0.24  # smoothing radius / RMS radius of the skin; 2 cm on a head of 24 cm (RMS 8.4 cm)
-_CELL = 0.4  # of the smoothing radius: edge length of the grid cells that are summed first
+_CELL = 0.4  # smoothing radii: edge length of the grid cells whose vertices are summed first
 _STEADY = 1e-6  # weight of the whole head's transform, which keeps the systems regular
 _NORMAL = 0.25  # weight of the normal; edges do not measure the stretch along it
 _AT_ONCE = 1024  # vertices that are smoothed together

@@ -32,11 +32,15 @@ _FACING = 0.2  # least cosine between one normal and the opposite of the other n
 # Standard deviations of the correction around a contact, for joints and for shapes, as fractions of
 # the smoothing radius of 2 cm.
 _BY_JOINTS, _BY_SHAPES = 0.25, 0.05
-_SEEN = 0.001  # of the reach: smaller deltas are not added to a blend shape
-_MOST, _FEW = 0.8, 8  # largest share of a motion that is added to it; least number of contacts
-_LARGEST, _FADES = 0.15, 0.5  # of the reach: largest delta of one step, and its fall-off
+_SEEN = 0.001  # smoothing radii: shorter deltas are not added to a blend shape
+# _MOST: largest fraction of a joint motion that is added to it or removed from it. _FEW: a control
+# with fewer contacts is not corrected.
+_MOST, _FEW = 0.8, 8
+# In smoothing radii: largest delta of one step, and the standard deviation of the Gaussian by which
+# deltas fade out with the distance from the closest contact.
+_LARGEST, _FADES = 0.15, 0.5
 _OVERLAP = 1.5  # standard deviations of the gaps: overlap of the lids that the joints aim at
-_LIDS = 1.7  # of the radius of an eye: skin within this distance of its centre is a lid
+_LIDS = 1.7  # radii of an eye: skin within this distance of the eye's centre is a lid
 
 
 class Touch(NamedTuple):

@@ -52,7 +52,8 @@ def conform(
     closest point, each eye keeps its shape and is fitted into the lids, and teeth and tongue move
     as one rigid part. A joint follows the skin that it carries. Blend shapes and joint translations
     are transformed by the deformation gradients. Joint rotations and the layers of solvers and
-    networks stay unchanged. Controls that close the lids are adjusted until the lids meet again.
+    networks stay unchanged, except that root joints are rotated with a rotated head. Controls that
+    close the lids are adjusted until the lids meet again.
 
     Args:
         dna: the source face; it is not changed.

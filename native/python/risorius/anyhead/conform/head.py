@@ -37,7 +37,8 @@ class Conformed:
 
     Attributes:
         dna: the conformed face.
-        moved: float64[V, 3], the vertex positions of its skin.
+        moved: float64[V, 3], the vertex positions of its skin, in the axes and the unit of the
+            face's file.
         sculpted: names of the meshes that the head has with the topology of the face; empty if the
             skin was registered onto a head of another topology.
         notes: sentences about guesses and steps.
@@ -108,7 +109,8 @@ def conform_face(
 
 
 def parts_of(dna: Dna) -> list[HeadPart]:
-    """The meshes of LOD 0 of a face as parts of a head, in the axes x left, y up, z front.
+    """The meshes of LOD 0 of a face as parts of a head, in the file's unit, with x to the left, y
+    up and z to the front.
 
     Args:
         dna: the face.

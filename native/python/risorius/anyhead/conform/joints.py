@@ -23,7 +23,7 @@ from .parts import Stiff, finest
 
 _HELD = 1e-6  # sum of skin weights: a joint with less counts as a joint without vertices
 _SOME = (
-    0.05  # of the weights in the mouth: a jaw carries more than this share and less than the rest
+    0.05  # a jaw carries more than this share of the weights in the mouth, and less than 1 - _SOME
 )
 Carried = Mapping[int, tuple[Doubles, Doubles, Doubles]]  # mesh -> before, after, linear
 

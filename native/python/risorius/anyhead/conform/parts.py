@@ -22,8 +22,9 @@ from .change import Change, Similar, similar
 
 _ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
 _MOUTH = re.compile(r"saliva", re.IGNORECASE)
-_INNER = 0.35  # of the radius: joints closer to the centre of an eye move with the eye
-_RIM, _BAND = 1.1, 0.03  # of the radius: distance of the lid rims from the centre, and its spread
+_INNER = 0.35  # radii of an eye: joints closer to the eye's centre move with the eye
+# Distance of the lid rims from the centre of an eye, and its standard deviation, in radii.
+_RIM, _BAND = 1.1, 0.03
 _STIFF = 0.9  # a vertex moves with the eye if the eye's joints have more of its skin weights
 _PRIOR = 0.01  # weight of the surrounding skin against the distance of the lid rims
 _ROUNDS = 20
@@ -209,7 +210,8 @@ def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
     """The transform that keeps the distance between the eyeball and the lid rims in proportion.
 
     The rims are a narrow band of a sphere and determine its centre well. Its radius needs the
-    transform of the surrounding skin as a prior.
+    transform of the surrounding skin as a prior. That transform is returned if fewer than 12
+    vertices of the rims are visible.
     """
     start = change.around(middle, radius)
     away = change.before.points - middle

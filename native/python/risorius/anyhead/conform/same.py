@@ -18,14 +18,17 @@ from .parts import finest, skin_of
 
 _AS_IT_IS = 2.0  # a head up to twice as large or small has the unit of the face
 _LEANS = np.cos(np.radians(30.0))  # cosine of the largest angle of a head to the axes of its file
-_FIVE = 5  # triangles of polygons with more corners are not compared
+# Triangulations of polygons with more corners are not recognised; polygons with more corners in the
+# other mesh are accepted without a comparison.
+_FIVE = 5
 
 
 def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
     """float64[V, 3] by mesh name: vertex positions in the head, for each LOD 0 mesh with a match.
 
-    A mesh matches if it has the same polygons, also triangulated. If several meshes match, such as
-    both eyes, the most similar name is taken, then the first.
+    A mesh matches if has_polygons_of() is true. If several meshes match, such as both eyes, the
+    mesh whose name has the longest common beginning is taken, then the first. A mesh of the head is
+    taken only once.
 
     Args:
         dna: the face.
@@ -44,11 +47,12 @@ def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
 
 
 def has_polygons_of(mesh: Mesh, other: ObjMesh) -> bool:
-    """Whether a mesh has the vertex count and the polygons of a mesh of a face.
+    """Whether a mesh has the vertex count of a mesh of a face, and only polygons of that mesh.
 
     Args:
         mesh: the mesh of the face.
-        other: the other mesh; its polygons may be triangulated.
+        other: the other mesh; polygons of up to 5 corners may be triangulated in it. Its polygons
+            with more corners are accepted without a comparison.
     """
     if len(other.positions) != len(mesh.positions) or not other.faces:
         return False
@@ -70,14 +74,14 @@ def into_own_space(
 ) -> tuple[dict[str, Doubles], str]:
     """Convert a sculpt to the axes and the unit of a face.
 
-    A sculpt in the axes and the unit of the face is returned unchanged. Another one is rotated by
-    right angles and scaled by the ratio of two units. The second value is a sentence about the
-    conversion, "" for none.
+    A sculpt in the axes and the unit of the face is returned unchanged. Another one is rotated,
+    see turn_back(), and scaled. The second value is a sentence about the conversion, "" for none.
 
     Args:
         dna: the face.
         moved: float64[V, 3] by mesh name; the skin is required.
-        factor: the scale; None: guessed.
+        factor: the scale; None: 1 for a head up to twice as large or small as the face, else the
+            ratio of two units that fits best.
     """
     skin = skin_of(dna)
     before = np.asarray(dna.meshes[skin].positions, np.float64)
@@ -95,7 +99,10 @@ def into_own_space(
 
 
 def turn_back(turn: Doubles) -> Doubles:
-    """float64[3, 3]: the rotation from a head to a face, a multiple of right angles if possible.
+    """float64[3, 3]: the rotation from a head to a face.
+
+    A rotation by right angles is returned if the head is turned by less than 30 degrees from it,
+    otherwise the inverse of `turn`.
 
     Args:
         turn: float64[3, 3], the rotation from the face to the head.

@@ -13,7 +13,7 @@ import numpy as np
 from ..._native import ClosestPoints
 from ...author.geometry.skeleton import Doubles, Ints
 
-_OUTSIDE = 3.0  # of the radius: distance from the centre at which rays towards the eye begin
+_OUTSIDE = 3.0  # radii: distance from the centre at which rays towards the eye begin
 
 
 @dataclass(frozen=True)

@@ -27,16 +27,17 @@ _PRESSED = 0.15  # mm by which closed edges overlap
 _OVER = 0.4  # mm that smoothing may move an edge beyond the gap of its column
 _BESIDE = 0.5  # mm beyond the edges in which a visible eye still counts as a gap
 _THROUGH = 0.8  # mm that the edges of closed lids may overlap
-_LOWER = 0.15  # share of the gap that the lower lid closes
+_LOWER = 0.15  # fraction of the gap that the lower lid closes; the upper lid closes the rest
 _VIEW = 80  # rays per axis of the grid of a view of closed lids
-_VIEWS = ((0.0, 0.0), (-25.0, 0.0), (25.0, 0.0), (0.0, 20.0), (0.0, -20.0))  # degrees
+# Directions from which closed lids are viewed: degrees to the character's left and up, from front.
+_VIEWS = ((0.0, 0.0), (-25.0, 0.0), (25.0, 0.0), (0.0, 20.0), (0.0, -20.0))
 _ROUNDS = 8
 _CUT = 0.02  # mm: smaller depths of closed lids in the eye are ignored
 _ENOUGH = 0.04  # mm: largest visible gap of closed lids
 _SOFT = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0])  # smoothing weights of neighbouring columns
-_HELD = 1.5  # of the radius: from this distance to the eye's centre on, lid motion fades out
+_HELD = 1.5  # radii from the eye's centre: corrections of lid vertices farther away fade out
 _LOOKS = 64  # rays per axis of the grid that finds where the eye comes through the lids
-_LIFTS = 4  # rounds
+_LIFTS = 4  # largest number of rounds that lift the triangles of lids out of the eye
 _SCALES = (0.6, 2.5)  # least and largest factor of the transferred turn
 _SPREAD = 6  # smoothing rounds that spread a lift to neighbouring vertices
 _MOVED = 0.1  # mm: smaller motions are ignored
@@ -124,7 +125,7 @@ class Eyelids:
 
     def apart(self, points: Doubles) -> float:
         """The mean distance between the upper and the lower edge, divided by the upper edge's
-        width.
+        width; 0 if an edge has no vertices.
 
         Args:
             points: float64[V, 3], vertex positions of the target in any pose or shape.
@@ -279,7 +280,8 @@ class Eyelids:
 
     def _apart(self, points: Doubles, turn: Doubles | None) -> Doubles:
         """float64[columns]: for each column of the opening, the angle in radians by which the edges
-        have to approach each other; negative if they overlap by more than closed lids may."""
+        have to approach each other; negative if they overlap by more than closed lids may; zeros if
+        an edge was found in no column."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         unit = self.mm / self.ball.radius
         apart = high - low
@@ -390,7 +392,7 @@ class Eyelids:
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]
         # The rim of a moved lid is lifted to the distance from the eye's surface that it has in the
-        # rest pose, or to _SKIN mm if that distance is larger.
+        # rest pose, but to no more than _SKIN mm.
         moved = np.linalg.norm(points - self.rest, axis=1) > _MOVED * self.mm
         rim = (self._from_edge < _BAND) & (moved | (turn is not None))
         need = np.maximum(self.ball.reach(ray, turn) + np.minimum(self._height, _SKIN * self.mm)

@@ -20,7 +20,7 @@ from ..surface import Surface
 from .eyeballs import Eyeball
 
 Mask = npt.NDArray[np.bool_]
-FAR = 1.9  # of the radius: largest distance of a lid from the eye's centre
+FAR = 1.9  # radii of the eye: largest distance of a lid from the eye's centre
 COLUMNS = 48  # directions across the opening at which the edges are known
 _WIDE, _HIGH = 72.0, 60.0  # degrees across and up from the front that are searched
 _STEP = 2.0  # degrees between the rays of the first search
@@ -28,7 +28,7 @@ _FINE = 0.5  # degrees between the rays of the second search, before the edges a
 _HALVINGS = 6
 _ABOVE = 1.001  # rays begin at this multiple of the distance of the eye's surface
 _LEAST = 6  # least number of rays of the first search in an opening, after repeated erosion
-_SURE = 12  # the same after the first erosion
+_SURE = 12  # least number of rays of the first search in an opening, after the first erosion
 _CUTS = 4  # largest number of erosions
 
 
@@ -154,7 +154,8 @@ def _seen(tree: ClosestPoints, ball: Eyeball, rays: Doubles, turn: Doubles | Non
 
 def _between_lids(seen: Mask) -> Mask | None:
     """The largest region of free rays that does not reach the border of the searched grid; a region
-    at the border lies outside the lids. Erosion first cuts leaks through holes of a scan."""
+    at the border lies outside the lids. Erosion first cuts leaks through holes of a scan. None if
+    no region is large enough."""
     core = seen
     for cuts in range(_CUTS):
         core = core & _beside(core, np.minimum.reduce)
@@ -207,7 +208,8 @@ def _turned(frame: Frame, across: Doubles, up: Doubles, blob: Mask) -> Frame:
 def _refined(
     tree: ClosestPoints, ball: Eyeball, frame: Frame, columns: Doubles, bounds: Doubles
 ) -> Opening | None:
-    """The lid edges of each column, bisected to a hundredth of a degree.
+    """The lid edges of each column, bisected to a hundredth of a degree; None if the second search
+    finds no free ray.
 
     columns: angles across of the first search. bounds: float64[n, 2], lowest and highest free angle
     of each column. All in radians.
@@ -237,8 +239,8 @@ def _refined(
     return Opening(frame, across, edges[0], edges[1])
 
 
-_MARGIN = np.radians(4.0)  # that rays of visible_gap go beyond the opening
-_HEIGHTS = 240  # rays per column
+_MARGIN = np.radians(4.0)  # angle by which the rays of visible_gap go beyond the lid edges at rest
+_HEIGHTS = 240  # rays of visible_gap per column
 
 
 def gap_rays(opening: Opening) -> Doubles:

@@ -31,8 +31,10 @@ from .template_parts import template_parts
 Mask = npt.NDArray[np.bool_]
 _RIM = 1.5  # mm from the edge of a lid: width of the rim that touches the eye
 _PATCH = 40  # skin vertices that determine the place of a lash
-_SEEN = 0.3  # of the template's opening: an eye with a smaller opening is painted or closed
-_OPENED = 0.45  # of the template's lid distance: lids that are closer are closed
+# An eye is painted or closed if the area of its opening, or the distance between its lids relative
+# to their width, is below these fractions of the template's.
+_SEEN = 0.3
+_OPENED = 0.45
 _AROUND = 2.5  # cm around the teeth: skin that determines their place
 _STEP, _STEPS = 0.05, 16  # cm per step, and number of steps, that move teeth back behind the lips
 _THROUGH = 0.02  # cm that teeth may come through the skin
@@ -47,7 +49,7 @@ def complete(
     Args:
         found: the meshes of the head.
         template: a face of a DNA file.
-        laid: float64[V, 3], positions of the vertices of the template's skin on the head.
+        laid: float64[V, 3], positions of the vertices of the template's skin on the head, in cm.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
 

@@ -21,7 +21,9 @@ from .heads import HeadForm, head_form
 _ALIKE = 0.08  # share of the pairs that count as independent, because neighbours err alike
 _ALONG = 0.15  # weight of distances along the surface, against 1 across it
 _EXPRESSED = 4.0  # prior of an expression against a part: a weight of 0.5 is as rare as 1 of a part
-_SELDOM = ("smile", "pucker")  # held strongly, or they would imitate the neutral mouth of a person
+# Expressions with a 20 times stronger prior, because otherwise they would be fitted to the form of
+# a person's neutral mouth.
+_SELDOM = ("smile", "pucker")
 _OPEN = (0.0, 1.2)  # range of the weight of an expression
 _BEYOND = 3.5  # standard deviations: largest weight of a part
 
@@ -154,7 +156,9 @@ def fit(
         pose: the pose to begin with; it is not changed.
         steps: the steps of the fit in order.
         held: vertices of the model with known positions.
-        weights: float64[V], weight of each vertex of the model; None: the weights in the model.
+        weights: float64[V], weight of each vertex of the model; all skin vertices with a weight
+            other than 0 are paired, and `vertices` of the steps is ignored. None: the weights in
+            the model.
         form: the model, with the triangles of `head_form()`; None: `head_form()` itself.
     """
     form = form or head_form()

@@ -15,14 +15,17 @@ from ..telling import Progress, telling
 from .fitting import FINE, PLACE, ROUGH, Held, Pose, Step, Target, fit, pose_normals
 from .heads import HeadForm, head_form
 
-TOP, CHIN, BACK, FRONT = 11.5, -11.5, -15.0, 5.0  # of the mean form, cm
+TOP, CHIN, BACK, FRONT = 11.5, -11.5, -15.0, 5.0  # cm: extent of the mean head in y, then in z
 _SHARES = (1.0, 0.72, 0.5, 0.32, 0.2, 0.13)  # tried heights of the head / height of the surface
 _PLACED, _KEPT, _TRIED = 48, 10, 3  # number of guesses that each stage keeps
 _WORSE = 1.6  # guesses with an error above this multiple of the least error are dropped
-_OBLIQUE = 48  # number of rotations
-SURE, NO_FACE = 0.13, 0.21  # largest error of a certain head; larger errors than NO_FACE: no head
-_GRIDS = (400, 280, 200, 140, 100, 70, 50)  # cells along the longest side
-_CELLS = 9000  # largest number of vertices of a coarsened surface
+_OBLIQUE = 48  # number of rotations of `oblique`
+# cm of the model: largest Standing.error of a certain head, and of a possible one
+SURE, NO_FACE = 0.13, 0.21
+# Cells of a grid along the longest side of a surface. The first grid with which the coarsened
+# surface has at most _CELLS vertices is used, otherwise the last grid.
+_GRIDS = (400, 280, 200, 140, 100, 70, 50)
+_CELLS = 9000
 _FAR = 1.5  # cm of the model: larger distances count as this distance
 
 
@@ -180,7 +183,8 @@ def _best(
 
 
 def coarsened(surface: Surface) -> Surface:
-    """A simplified surface: all vertices in a cell of a grid are merged into one.
+    """A simplified surface: all vertices in a cell of a grid are replaced by their mean. Triangles
+    that become a line or a point are left out.
 
     Args:
         surface: the surface; it is not changed.

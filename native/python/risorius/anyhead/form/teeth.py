@@ -20,6 +20,9 @@ from .standing import SURE, find_standing
 
 _NEAR = 1.0  # cm of the model: largest distance of a vertex of the model from the face
 _LEAST = 0.9  # least fraction of the vertices of the regression that must be on the face
+# cm of the model: largest error of a fit (form.standing.Standing) for which the regression counts.
+# The model describes other heads too poorly to tell the size of their jaws.
+_DESCRIBED = 0.075
 _BEYOND = 3.0  # limit of each predicted value in standard deviations
 _OTHER_SIZE = 0.1  # teeth with a larger relative difference from the predicted size are ignored
 _OTHER_PLACE = 0.4  # cm: teeth farther from their predicted place are ignored
@@ -33,11 +36,13 @@ class JawChange:
     Attributes:
         before, after: float64[3], the same point of the jaw on the first and the second head.
         linear: float64[3, 3], maps vectors on the first jaw to vectors on the second jaw.
+        sure: whether the head model describes both heads well, or their teeth confirm the change.
     """
 
     before: Doubles
     after: Doubles
     linear: Doubles
+    sure: bool = True
 
 
 def standing_pose(surface: Surface) -> Pose | None:
@@ -50,7 +55,9 @@ def standing_pose(surface: Surface) -> Pose | None:
     return best.pose if best.error <= SURE else None
 
 
-def jaw_change(surface: Surface, points: Doubles, on: Surface, pose: Pose) -> JawChange | None:
+def jaw_change(
+    surface: Surface, points: Doubles, on: Surface, pose: Pose, error: float = 0.0
+) -> JawChange | None:
     """The change of the lower jaw between two heads with the same triangles.
 
     Args:
@@ -58,6 +65,7 @@ def jaw_change(surface: Surface, points: Doubles, on: Surface, pose: Pose) -> Ja
         points: float64[V, 3], vertex positions of the second head.
         on: the surface of one of these heads, to which the head model was fitted.
         pose: the fitted model.
+        error: the larger error of the model's fits to both heads, in cm of the model.
 
     Returns:
         The change; None if the head lacks a part of the face.
@@ -69,7 +77,8 @@ def jaw_change(surface: Surface, points: Doubles, on: Surface, pose: Pose) -> Ja
     one, other = (
         _teeth(used, np.einsum("nk,nkd->nd", shares, p[corners])) for p in (surface.points, points)
     )
-    return JawChange(one[0], other[0], other[1] @ np.linalg.inv(one[1]))
+    linear = other[1] @ np.linalg.inv(one[1])
+    return JawChange(one[0], other[0], linear, error <= _DESCRIBED)
 
 
 def _places(surface: Surface, pose: Pose) -> tuple[Ints, Ints, Doubles] | None:

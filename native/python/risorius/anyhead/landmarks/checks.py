@@ -11,9 +11,12 @@ from ..form.fitting import Pose, Target
 from ..surface import Surface
 from .marks import LandmarkError
 
-LEAST, MOST = 200, 1_000_000  # vertices of a head
-_FLAT = 0.02  # of a mesh's size: border vertices within this distance of a plane lie in it
-_CUT = 0.3  # of the border: a mesh with more of its border in one end plane was cut there
+LEAST, MOST = 200, 1_000_000  # smallest and largest number of vertices of a head
+# Border vertices count as in a plane if they are within this fraction of the longest side of the
+# mesh's bounding box.
+_FLAT = 0.02
+# A mesh was cut at a side of its bounding box if this fraction of its border vertices is there.
+_CUT = 0.3
 _DEEP = 0.12  # cm of the model: least depth of a step between the lids that counts as an opening
 _ROWS, _COLUMNS = 25, 5  # grid of rays through an eye
 _LOOKED_AT = 100_000  # largest number of edges that are tested

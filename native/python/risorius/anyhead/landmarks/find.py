@@ -133,7 +133,12 @@ def find_form(
 
 
 def _looked_at(target: Surface, hints: Hints, tell: Progress) -> tuple[Target, Pose, float]:
-    """The head (a piece of the surface), the fitted head model, and the error of the fit."""
+    """The surface or the piece of it in which a face was found, the fitted head model, and the
+    error of the fit.
+
+    Raises:
+        LandmarkError: no face was found, or faces were found in two pieces.
+    """
     seen = Target(target)
     best = _standing(seen, hints, tell)[0]
     parts = [p for p in pieces(target) if len(np.unique(p.triangles)) >= LEAST]

@@ -11,8 +11,8 @@ from ...author.geometry.skeleton import Doubles
 from ..form.fitting import Pose, Step, Target, fit
 from ..form.heads import HeadForm, head_form
 
-_ALL = 1 << 20  # above any number of vertices
-_PARTS = 40  # of the model; a region does not determine more
+_ALL = 1 << 20  # a limit above any number of vertices: all vertices are paired
+_PARTS = 40  # number of principal components that are fitted; a region does not determine more
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from .names import vague_landmarks
 _NEIGHBOURS = 12  # vertices of the model from which the displacement of a point is interpolated
 _REACH = 2.5  # cm of the model: radius in which a landmark moves the skin
 _ROWS = 2000  # points that are computed together, to limit memory
-_ALL_PARTS = 1 << 20  # above any number of parts
+_ALL_PARTS = 1 << 20  # a limit above any number of principal components: all of them are fitted
 _CLOSER = (  # a fit with all parts, before the template's own vertices are known
     Step(6, 0.6, 4000, _ALL_PARTS, 1.0, 0.5),
     Step(8, 0.3, 4000, _ALL_PARTS, 0.5, 0.5),
@@ -32,7 +32,8 @@ _AS_TEMPLATE = (  # a fit of the model that has the template's surface
     Step(8, 0.3, 4000, _ALL_PARTS, 0.4, 0.5, noise=0.04),
 )
 _ON = 1.0  # cm of the form: farthest place of the template that a vertex of the form is moved to
-_SURE = 0.6  # cm of the form: distance of such a place whose share is 1/e
+# cm of the form: if the place is this far away, the vertex moves by 1/e of the distance
+_SURE = 0.6
 _HELD = 30.0  # weight of a landmark that the user moved, against a pair in the middle of the face
 
 
@@ -66,7 +67,8 @@ def start_of(
 
 
 def _like(seen: Target, pose: Pose) -> HeadForm:
-    """The model with another mean: with the weights of the pose, it lies exactly on the surface.
+    """The model with another mean: with the weights of the pose, its vertices lie on the surface,
+    except vertices that are too far from it (see _ON and _SURE).
 
     So a later fit to another head compares the two surfaces. Details of the first surface that the
     model cannot represent are then in the mean, and do not count as a difference.
@@ -87,7 +89,8 @@ def _by_hand(name: str, one: Found, other: Found) -> bool:
 
 
 def _moved(one: Found, other: Found) -> Held | None:
-    """The landmarks that the user moved on either head, at their places on the second head."""
+    """The landmarks that the user moved on either head, at their places on the second head; None if
+    there are none that both heads and the model have."""
     places = head_form().places
     names = [n for n in common(one, other) if n in places and _by_hand(n, one, other)]
     if not names:

@@ -20,14 +20,18 @@ from ...base.easing import smooth_step
 from ..surface import Surface
 
 _ROUND = ("mouthLipsPurse", "mouthFunnel", "mouthPucker")  # prefixes of controls that move the lips
-_LIP = 0.25  # of the largest motion by these controls: least motion of a lip vertex
-_STILL, _TAKEN = 0.35, 0.6  # of the jaw's motion: largest of the upper lip, least of the lower lip
+# Least motion of a lip vertex by the controls of _ROUND together, as a fraction of the largest.
+_LIP = 0.25
+# Largest motion of an upper lip vertex and least motion of a lower lip vertex by jawOpen, as
+# fractions of the motion that 90 % of the lip vertices do not exceed.
+_STILL, _TAKEN = 0.35, 0.6
 COLUMNS = 40  # sections of the mouth from corner to corner
 _WIDTH_MM = 50.0  # width of a human mouth; lengths in mm below are scaled to the actual mouth
 _RIM = 1.2  # mm beyond the nearest vertex of a column that still belong to the rim
 _FADE = 14.0  # mm from the rim along the skin: vertices beyond keep their place
 _BAND = 2.5  # mm from the rim along the skin: vertices up to here move with the rim
-_CORNER = 0.08  # of the width: no columns this close to a corner, because lips may be joined there
+# Fraction of the mouth's width: columns are not this close to a corner, where lips may be joined.
+_CORNER = 0.08
 _TOUCH = 0.8  # mm: lips touch in the rest pose if their gap is below half of it
 _GOAL = 0.05  # mm: gap between closed lips
 _DEEP = 0.1  # mm that lips may press into each other, or their depth in the rest pose if larger
@@ -35,7 +39,7 @@ _ROUNDS = 12
 _UPPER_MM, _LEAST_SHARE = 2.0, 0.15  # mm that the upper lip moves, and its least share of the gap
 _FAR_MM = 6.0  # mm: wider gaps are not closed
 _OVER = 0.3  # mm that smoothing may move a column beyond its gap
-_SOFTER = 2.0  # of the gap: least length of the fade
+_SOFTER = 2.0  # length of the fade / widest gap; the fade is at least _FADE mm long
 _SMOOTH = 24  # limit of the smoothing rounds over columns
 _AGAINST = 0.3  # least cosine between the inward normal and the direction to a point inside
 _NEAR = 3.0  # mm: a point that is deeper counts as outside

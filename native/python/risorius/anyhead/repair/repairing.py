@@ -66,6 +66,8 @@ def repair(
 ) -> Repaired:
     """Repair expressions: close the lids and lips, and take skin out of eyes and teeth.
 
+    The pose of closing_pose() is added to the combinations if it is not among them.
+
     Args:
         target: the skin in the rest pose, in cm, y up, the face towards +z.
         faces: polygons of the skin.
@@ -185,7 +187,10 @@ class Repairing:
         self.contacts = Contacts(target, faces, self.bodies)
 
     def repaired(self, pose: Pose, way: Doubles) -> Doubles:
-        """float64[V, 3]: the repaired displacements of a pose. Its faults are added to the report.
+        """float64[V, 3]: the repaired displacements of a pose.
+
+        If the pose has faults, or closes eyes or the mouth, its faults before and after the repair
+        are added to the report. A pose without displacements is returned unchanged.
 
         Args:
             pose: names of the raw controls with value 1.

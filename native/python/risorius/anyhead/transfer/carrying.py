@@ -3,7 +3,7 @@
 
 Vertices that the jaw moves are rotated by the same angle as on the template, about the hinge of the
 other head's jaw. The remaining motion is transformed by the deformation gradients between both
-heads.
+heads. Both are softened: the motions of similar heads are more alike than the heads.
 """
 
 from __future__ import annotations
@@ -13,12 +13,15 @@ import numpy as np
 from ...author.geometry.rigid import rigid_way
 from ...author.geometry.skeleton import Doubles
 from ..form.teeth import JawChange
-from .closing import BLINKS, closing_shares
-from .form import changes_of_form
+from .closing import BLINKS, closing_shares, closing_shift
+from .form import changes_of_form, softened
 from .template import Pose, TemplateFace, left_over
 
 _REST = 0.05  # cm: vertices that the jaw moves less count as not moved by it
 _FLESH = 0.1  # relative size difference up to which soft tissue explains it, not the bone
+# Least exponent of a small change of size for the motion of skin and for the shift of the jaw.
+_OF_SKIN, _OF_JAW = 0.6, 0.75
+_OPENS, _CLOSES = ("jawOpen",), ("mouthClose",)  # mouthClose closes the lips of an open jaw
 _SPURIOUS = 0.002  # cm: a corrective fades out where the template's corrective is smaller
 
 
@@ -38,20 +41,31 @@ class Carrying:
             face: the template.
             points: float64[V, 3], positions of its vertices on the other head, cm.
             trust: float64[V], 0 to 1: confidence in each position.
-            teeth: the change of the jaw; None: it is estimated from the skin.
+            teeth: the change of the jaw; None or not sure: it is estimated from the skin.
         """
         self._face, self._points = face, points
-        self._form = changes_of_form(face.surface, points, trust)
-        self._jaw = self._jaw_by_form(trust) if teeth is None else teeth
+        form = changes_of_form(face.surface, points, trust)
+        self._form = softened(form, _OF_SKIN)
+        self._jaw = self._jaw_by_form(form, trust)
+        if teeth is not None and teeth.sure:
+            self._jaw = JawChange(teeth.before, teeth.after, softened(teeth.linear, _OF_JAW))
         self._closing: dict[str, Doubles] = {}
+        self._shifts: dict[str, Doubles] = {}
         for control in BLINKS:
             if (control,) in face.ways:
                 shares = closing_shares(face, points, control, self.carried((control,)))
                 if shares is not None:
                     self._closing[control] = shares
+                    way = self.carried((control,))
+                    self._shifts[control] = closing_shift(face, points, control, way)
 
-    def _jaw_by_form(self, trust: Doubles) -> JawChange | None:
-        """The change of the jaw, estimated from the deformation of the skin that jawOpen moves."""
+    def _jaw_by_form(self, form: Doubles, trust: Doubles) -> JawChange | None:
+        """The change of the jaw, estimated from the deformation of the skin that jawOpen moves.
+
+        Args:
+            form: float64[V, 3, 3], the deformation gradients of the skin.
+            trust: float64[V], 0 to 1: confidence in the position of each vertex.
+        """
         face = self._face
         if face.jaw is None:
             return None
@@ -59,8 +73,8 @@ class Carrying:
         weight = np.ones(len(trust)) if opening is None else np.linalg.norm(opening, axis=1)
         weight = weight.astype(np.float64) * (trust + 1e-3)
         weight /= weight.sum()
-        form = np.einsum("v,vij->ij", weight, self._form)
-        grown = float(np.log(np.cbrt(max(np.linalg.det(form), 1e-3))))
+        mean = np.einsum("v,vij->ij", weight, form)
+        grown = float(np.log(np.cbrt(max(np.linalg.det(mean), 1e-3))))
         # Small size differences are attributed to soft tissue, so they do not change the jaw.
         size = float(np.exp(grown * grown**2 / (grown**2 + _FLESH**2)))
         middle, other = weight @ face.surface.points, weight @ self._points
@@ -95,10 +109,33 @@ class Carrying:
         way = self._by_form(pose)
         for control in pose:
             way = way * self._closing.get(control, 1.0)
+        for control in pose:
+            way = way + self._shifts.get(control, 0.0)
         return way
 
     def _by_form(self, pose: Pose) -> Doubles:
-        way = self._face.ways[pose].astype(np.float64)
+        """float64[V, 3]: displacements in a pose before the lids are closed."""
+        ways = self._face.ways
+        way = ways[pose].astype(np.float64)
+        turns = {} if self._face.jaw is None else self._face.jaw.turns
+        if pose == _CLOSES and _OPENS in turns and pose not in turns:
+            # The shape is the difference between an open jaw with closed lips and jawOpen.
+            opening = ways[_OPENS].astype(np.float64)
+            return self._turned(opening + way, _OPENS) - self._turned(opening, _OPENS)
+        # A smile does not change how far the skin follows the jaw, but a corrective may.
+        beside = [(c,) for c in pose if len(pose) > 1 and (c,) not in turns and (c,) in ways]
+        if pose not in turns or not beside:
+            return self._turned(way, pose)
+        alone = sum(ways[single].astype(np.float64) for single in beside)
+        return self._turned(way - alone, pose) + self._turned(np.asarray(alone), beside[0])
+
+    def _turned(self, way: Doubles, pose: Pose) -> Doubles:
+        """float64[V, 3]: a displacement on the other head.
+
+        Args:
+            way: float64[V, 3], the displacement on the template.
+            pose: the pose whose motion of the jaw is in the displacement.
+        """
         jaw, change = self._face.jaw, self._jaw
         if jaw is None or change is None or pose not in jaw.turns:
             return np.asarray(np.einsum("vij,vj->vi", self._form, way))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Scales the motion of lids so that they meet on another head.
+"""Scales and shifts the motion of lids so that they meet on another head.
 
 The deformation gradient of a lid does not contain the height of the eye opening. If two points of
 the template's lids meet in a blink, the same points must meet on the head. So motions near these
-points are multiplied by the factor that closes the gap.
+points are multiplied by the factor that closes the gap along the motion. A shift closes the rest.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from .template import TemplateFace
 BLINKS = ("eyeBlinkL", "eyeBlinkR")
 _MOVES = 0.02  # cm: a vertex that a blink moves less does not belong to a lid
 _MEETS, _APART = 0.1, 0.35  # cm: largest distance in contact, and least distance in the rest pose
-_AROUND = 0.3  # cm: standard deviation of the fall-off around contacts
-_REST = 0.02  # of the largest sum of weights: with a smaller sum the factor tends to 1
+# cm: standard deviation of the fall-off around contacts, of the factor and of the shift
+_AROUND, _BESIDE = 0.3, 0.15
+# of the largest sum of weights: with a smaller sum, the factor tends to 1 and the shift to 0
+_REST = 0.02
 _SHARES = (0.3, 2.0)  # smallest and largest factor
 _ROWS = 256  # number of vertices that are compared at once
 
@@ -65,16 +67,58 @@ def closing_shares(
     amount = np.einsum("ni,ni->n", closes, closes)
     wanted = np.einsum("ni,ni->n", closes, left) / np.maximum(amount, 1e-9)
     wanted = np.clip(wanted, *_SHARES) - 1.0
-    moved = np.flatnonzero(way.any(axis=1))
-    says, sums = np.zeros(len(moved)), np.zeros(len(moved))
-    for start in range(0, len(moved), _ROWS):
-        rows = slice(start, start + _ROWS)
-        square = _squares(surface.points[moved[rows]], surface.points[one])
-        weight = np.exp(-square / (2 * _AROUND**2)) * amount
-        says[rows], sums[rows] = weight.sum(axis=1), weight @ wanted
     out = np.ones((len(points), 1))
-    out[moved, 0] += sums / (says + max(_REST * float(says.max()), 1e-12))
+    moved = np.flatnonzero(way.any(axis=1))
+    out[moved] += _around(surface.points, moved, one, wanted[:, None], amount, _AROUND)
     return out
+
+
+def closing_shift(face: TemplateFace, points: Doubles, control: str, carried: Doubles) -> Doubles:
+    """float64[V, 3]: displacement to add to a blink, so that lids that meet on the template meet.
+
+    Of two points that meet, the point that moves farther gets the larger part of the displacement.
+
+    Args:
+        face: the template.
+        points: float64[V, 3], positions of its vertices on the other head.
+        control: name of the blink's control.
+        carried: float64[V, 3], the blink on the other head before this correction.
+    """
+    surface, way = face.surface, face.ways[(control,)].astype(np.float64)
+    one, other = lids_that_meet(surface, way)
+    out = np.zeros_like(points)
+    if not len(one):
+        return out
+    posed, there = surface.points + way, points + carried
+    left = (posed[one] - posed[other]) - (there[one] - there[other])
+    far = [np.square(carried[pair]).sum(axis=1) for pair in (one, other)]
+    share = (far[0] / np.maximum(far[0] + far[1], 1e-9))[:, None]
+    at, shift = np.concatenate([one, other]), np.concatenate([share * left, (share - 1) * left])
+    moved = np.flatnonzero(way.any(axis=1))
+    out[moved] = _around(surface.points, moved, at, shift, np.ones(len(at)), _BESIDE)
+    return out
+
+
+def _around(
+    points: Doubles, wanted: Ints, given: Ints, values: Doubles, weights: Doubles, reach: float
+) -> Doubles:
+    """float64[n, k]: means of the values near `wanted`, which tend to 0 far from all values.
+
+    Args:
+        points: float64[V, 3].
+        wanted: int64[n], indices of points.
+        given: int64[m], indices of the points that have values.
+        values: float64[m, k].
+        weights: float64[m], weights of the values.
+        reach: standard deviation of the fall-off with the distance.
+    """
+    out, sums = np.zeros((len(wanted), values.shape[1])), np.zeros((len(wanted), 1))
+    for start in range(0, len(wanted), _ROWS):
+        rows = slice(start, start + _ROWS)
+        square = _squares(points[wanted[rows]], points[given])
+        near = np.exp(-square / (2 * reach**2)) * weights
+        out[rows], sums[rows] = near @ values, near.sum(axis=1, keepdims=True)
+    return np.asarray(out / (sums + max(_REST * float(sums.max(initial=0.0)), 1e-12)))
 
 
 def _squares(one: Doubles, other: Doubles) -> Doubles:

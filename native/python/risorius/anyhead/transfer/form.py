@@ -16,6 +16,7 @@ from .smoothing import Smoothing, areas
 
 EVENED = 2.0  # cm: smoothing radius of the gradients
 _UNSURE = 0.3  # least weight of a vertex, for vertices that only followed their neighbours
+_ALIKE = 0.1  # natural logarithm of a stretch: far smaller changes get the least exponent
 _STEADY = 1e-6  # weight of the identity, for directions without edges
 
 
@@ -37,6 +38,23 @@ def changes_of_form(before: Surface, after: Doubles, trust: Doubles) -> Doubles:
     steady = _STEADY * scale * np.eye(3)
     turned = np.linalg.solve(own + steady, np.swapaxes(mixed + steady, 1, 2))
     return np.asarray(np.swapaxes(turned, 1, 2))
+
+
+def softened(forms: Doubles, least: float) -> Doubles:
+    """float64[..., 3, 3]: matrices with weaker stretches; rotations stay.
+
+    The motions of heads of similar size are more alike than the heads, and a small change of form
+    is partly an error of the registration. Each principal stretch is raised to a power, from
+    `least` for small changes to 1 for large changes, so that strongly stylised heads move fully.
+
+    Args:
+        forms: float64[..., 3, 3], regular matrices.
+        least: the power of a stretch near 1.
+    """
+    left, stretch, right = np.linalg.svd(forms)
+    change = np.log(np.maximum(stretch, 1e-9))
+    power = (change**2 + least * _ALIKE**2) / (change**2 + _ALIKE**2)
+    return np.asarray((left * np.exp(power * change)[..., None, :]) @ right)
 
 
 def _sums(before: Surface, after: Doubles) -> tuple[Doubles, Doubles]:

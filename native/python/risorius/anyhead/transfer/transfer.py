@@ -70,7 +70,8 @@ def transfer(
         options: strength and threads; None: the defaults.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
-        teeth: change of the lower jaw from the template to the head; None: estimated from the skin.
+        teeth: change of the lower jaw from the template to the head; None or not sure: estimated
+            from the skin.
 
     Raises:
         AnyHeadError: no vertex of the head is near the template, or the strength is out of range.

@@ -31,7 +31,8 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
 
     If a combination already has a corrective, the displacements are added to its shapes. At LODs
     that use all blend shape channels, other skins, lashes and other meshes with blend shapes get
-    the displacements of the nearest skin; teeth and eyeballs do not.
+    the displacements of the nearest skin, which fade out at distances from 6 to 12 mm; teeth and
+    eyeballs do not.
 
     Args:
         dna: a face of shapes; it is not changed.

@@ -129,7 +129,8 @@ def skin_and_solids(
 
     Args:
         dna: the face.
-        solids: parts of the names of meshes that the skin must not intersect.
+        solids: parts of the names of meshes that the skin must not intersect. Meshes whose names
+            also contain a word of _NO_SOLIDS, such as eyelashes, are no solids.
         lod: index of the LOD.
 
     Raises:

@@ -77,8 +77,10 @@ class Found:
     correctives: list[Corrective] = field(default_factory=list)
     looked_at: int = 0  # number of checked pairs
     faulty: int = 0  # number of pairs with faults
-    before: dict[str, float] = field(default_factory=dict)  # kind -> sum over pairs
-    after: dict[str, float] = field(default_factory=dict)  # the same with correctives
+    # kind of fault, one of KINDS -> sum over all checked pairs, without correctives
+    before: dict[str, float] = field(default_factory=dict)
+    # kind of fault -> sum over all checked pairs, with the correctives of pairs
+    after: dict[str, float] = field(default_factory=dict)
 
 
 class Search:
@@ -263,6 +265,7 @@ def correct_again(
         progress: gets the finished fraction, 0 to 1; returns False to stop.
 
     Raises:
+        ArgumentError: the face has no mesh, or has networks or solvers.
         DnaError: a value is not finite, or progress returned False.
     """
     search = Search(rig, options, progress, psd_parts(source).values())

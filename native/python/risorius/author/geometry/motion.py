@@ -36,6 +36,8 @@ class Motion(NamedTuple):
 def motions_of(dna: Dna, columns: Sequence[int], budget: Budget) -> Iterator[Motion]:
     """Yields a Motion for each input; the arrays of the Motion are empty if no joint moves.
 
+    Inputs that the joint groups read come first, in ascending order, then all others.
+
     Args:
         dna: the face.
         columns: indices of the inputs.

@@ -81,7 +81,8 @@ def _size(mesh: Mesh) -> float:
 
 
 def pieces_of(mesh: Mesh) -> Ints:
-    """int64[V]: number of the connected piece of each vertex; texture seams do not separate.
+    """int64[V]: number of the connected piece of each vertex; texture seams do not separate, and
+    vertices at the same position are connected.
 
     Args:
         mesh: the mesh.
@@ -210,7 +211,8 @@ def _fewer(
     # A closed surface has twice as many triangles as vertices; an open surface has fewer.
     count, found = 2 * vertices, triangles
     for _ in range(_TRIES):
-        begin = found if len(triangles) > 4 * LARGE else triangles  # to save time
+        # To save time, each try on a large mesh simplifies the result of the try before it.
+        begin = found if len(triangles) > 4 * LARGE else triangles
         found, _ = _native.simplify(points, attributes, begin, count)
         now = len(np.unique(places[found]))
         if now <= vertices or not len(found):

@@ -218,7 +218,7 @@ def column_shapes(dna: Dna, mesh: Mesh, columns: int) -> dict[int, Doubles]:
             if column < columns:
                 delta = out.setdefault(column, np.zeros((len(mesh.positions), 3)))
                 vertices = np.asarray(target.vertex_indices, np.int64)
-                if (np.diff(vertices) > 0).all():  # each vertex once
+                if (np.diff(vertices) > 0).all():  # no vertex occurs twice
                     delta[vertices] += target.deltas
                 else:
                     np.add.at(delta, vertices, target.deltas)

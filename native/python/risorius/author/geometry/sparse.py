@@ -69,7 +69,7 @@ class SparseShapes(MutableMapping[K, Doubles]):
 
         Args:
             key: the key; it may be new.
-            value: float64[n, 3], displacements of the vertices `first` to `first + n`.
+            value: float64[n, 3], displacements of the vertices `first` to `first + n - 1`.
             first: index of the first of these vertices.
         """
         none = np.zeros(0, np.int32), np.zeros((0, 3), self._dtype)

@@ -41,7 +41,8 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
     """Divide a mesh by materials; each island gets the material of most of its polygons.
 
     Polygons whose material is named like an eye or a part of the mouth are always cut off, even
-    inside an island.
+    inside an island. A mesh with one material, or with another number of polygons than `of_face`
+    has, stays whole and gets the most frequent material.
 
     Args:
         part: the mesh.

@@ -320,7 +320,8 @@ class _Joining:
         opening: Doubles | None,
         turns: list[Turn],
     ) -> list[tuple[HeadPart, str]]:
-        """Add the jaw's joint. If jawOpen rotates nothing, the jaw's meshes follow the head.
+        """Add the jaw's joint. If no shape opens the mouth, or if it rotates nothing, no joint is
+        added, and the jaw's meshes follow the head.
 
         Args:
             hanging: each mesh, and the joint that it follows.

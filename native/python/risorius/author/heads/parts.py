@@ -107,7 +107,8 @@ def meaning(name: str) -> tuple[str, ...]:
 
 
 def in_face_names(face: HeadPart, part: HeadPart) -> dict[str, Doubles]:
-    """The shapes of a mesh, renamed to the face's shapes with the same meaning.
+    """The shapes of a mesh, renamed to the face's shapes with the same meaning; others keep their
+    names. Of several shapes with the same new name, the first is kept.
 
     Args:
         face: the mesh of the face.

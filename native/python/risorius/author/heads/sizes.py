@@ -16,7 +16,8 @@ UNITS = {
     "0.1 mm": 0.1, "0.01 mm": 0.01, "10 m": 1e4,
 }  # fmt: skip
 SAID = ("m", "cm", "mm", "inch", "dm", "foot")  # units that the user may choose
-_LEAST, _MOST, _USUAL = 180.0, 300.0, 230.0  # mm, from the chin to the top of the mesh
+# Smallest, largest and most usual height of a face in mm, from the chin to the top of the mesh.
+_LEAST, _MOST, _USUAL = 180.0, 300.0, 230.0
 _ODD = (120.0, 450.0)  # mm, unusual heights that keep the file's unit, with a note
 _MOVED = 0.3  # vertices that move less than this fraction of a shape's maximum do not show the chin
 

@@ -95,7 +95,7 @@ def metadata_of(
         material = materials.get(_LOD.sub("_lod0_", name))
         for (number, role), file in textures.names.items():
             if number == id(material):
-                use = "roughness" if role == "orm" else role  # the file name tells the channel
+                use = "roughness" if role == "orm" else role  # the file's name says orm
                 out[f"texture:{name}:{use}"] = file
     return out
 

@@ -20,11 +20,15 @@ LOOKS = {"eyeLookUp": (-25, 0), "eyeLookDown": (30, 0), "eyeLookLeft": (0, 30),
           "eyeLookRight": (0, -30)}  # fmt: skip
 _EYE = re.compile(r"eye|iris|pupil|sclera|cornea", re.IGNORECASE)
 _BESIDE = re.compile(r"lash|brow|lid|eyeline|shadow|wet|edge|occl|glass|tear|shell", re.IGNORECASE)
-_NAMED_ROUND = 0.18  # as islands.ball_of's `off`, for meshes named eye, because corneas bulge
+# Largest standard deviation from the radius, in radii, of a sphere in a mesh named like an eye. It
+# is larger than for other meshes, because corneas bulge.
+_NAMED_ROUND = 0.18
 _SIZES = (0.02, 0.16)  # smallest and largest radius of an eye, in heights of the face
 _INSIDE = 1.1  # in radii: islands within this distance turn with the eye
 _NONE = np.zeros(0, np.int64)
-_FRONT, _SQUASH = 0.6, 0.25  # in radii, see _looks_out and _is_squashed
+# In radii. A sphere without vertices farther than _FRONT in front of its centre is a hollow socket.
+# A shape deforms a sphere if most vertices are farther than _SQUASH from their rigid motion.
+_FRONT, _SQUASH = 0.6, 0.25
 _LEAST_ANGLE = 0.03  # radians; smaller rotations do not count
 _NO_TURN = 0.4  # largest error of a rotation relative to a shape's largest displacement
 # Vertices that jawOpen moves by more than _HELD of its largest displacement count as rigid parts of
@@ -195,7 +199,7 @@ def _divided(
         np.maximum.at(furthest, islands, away)
         reach = _INSIDE * eye.ball.radius
         if _EYE.search(part.name):
-            reach *= 1.2  # because corneas bulge
+            reach *= 1.2  # the island of a cornea extends farther
         of_island[(furthest < reach) & with_polygons] = number
         of_island[islands[own[number]]] = number
     if (of_island == 2).all():

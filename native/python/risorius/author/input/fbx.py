@@ -43,7 +43,8 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     Returns: the mesh, and name of a blend shape -> displacements float64[V, 3].
 
     Raises:
-        ShapeFileError: the file has no mesh with blend shapes.
+        ShapeFileError: the file is no binary FBX, has no mesh with blend shapes or none of this
+            name, or the mesh is inconsistent.
         AnimationFileError: the file is damaged; the message names the place.
         BudgetError: the file contains more numbers than its size allows.
     """
@@ -87,7 +88,8 @@ def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
         number: object number of the mesh, from meshes_of().
 
     Raises:
-        AnimationFileError: the mesh is damaged; the message names the place.
+        ShapeFileError: the mesh is inconsistent; the message names the object.
+        AnimationFileError: packed bytes are damaged; the message names the place.
     """
     geometry = scene.objects[number]
     turn = _axes(scene) @ _to_world(scene, number)

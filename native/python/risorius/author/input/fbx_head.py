@@ -30,7 +30,7 @@ def read_fbx_head(path: Path) -> list[HeadPart]:
         path: the file.
 
     Raises:
-        ShapeFileError: the file contains no mesh or is no binary FBX.
+        ShapeFileError: the file contains no mesh or is no binary FBX, or a mesh is inconsistent.
         AnimationFileError: the file is damaged; the message names the place.
         BudgetError: the file contains more numbers than its size allows.
     """

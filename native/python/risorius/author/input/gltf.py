@@ -40,8 +40,9 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     Returns: the mesh, and name of a morph target -> displacements float64[V, 3].
 
     Raises:
-        ShapeFileError: the file has no mesh with morph targets, or an unsupported kind of mesh.
-        AnimationFileError: the file is damaged; the message names the place.
+        ShapeFileError: the file is no glTF, or has no mesh with morph targets or none of this name.
+        AnimationFileError: the file is damaged, or the mesh is not made of lists of triangles; the
+            message names the place.
         BudgetError: the file contains more numbers than its size allows.
     """
     document = open_document(path)

@@ -31,11 +31,13 @@ _KINDS = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp"}
 def read_gltf_head(path: Path) -> list[HeadPart]:
     """Read the meshes of a glTF, in metres with y up.
 
+    Primitives that are not lists of triangles are left out.
+
     Args:
         path: the file.
 
     Raises:
-        ShapeFileError: the file contains no mesh or an unsupported kind of mesh.
+        ShapeFileError: the file is no glTF or contains no triangles.
         AnimationFileError: the file is damaged; the message names the place.
         BudgetError: the file contains more numbers than its size allows.
     """
@@ -105,7 +107,7 @@ def _parts(
     groups: dict[int, list[dict[str, Any]]] = {}
     for primitive in gltf.primitives(document, row, number):
         kind = primitive.get("material")
-        if primitive.get("mode", 4) == 4:  # triangles; points and lines are left out
+        if primitive.get("mode", 4) == 4:  # lists of triangles; strips, lines, points are left out
             groups.setdefault(kind if isinstance(kind, int) else -1, []).append(primitive)
     if not groups:
         return []

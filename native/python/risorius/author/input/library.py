@@ -46,7 +46,8 @@ def about_library(became: Assignment, folder: Path) -> list[str]:
 
 
 def _expression(name: str, controls: Sequence[str]) -> Expression:
-    """An expression that sets a shape's controls, with the default library's label and group."""
+    """An expression that sets a shape's controls, with the default library's label and group; if
+    the library lacks the name, the label is made from the name, and the group is "face"."""
     own = expressions.load().get(name)
     weights: Mapping[str, float] = {PREFIX + control: 1.0 for control in controls}
     if own is None:

@@ -40,7 +40,8 @@ def meaning_of(value: Said) -> SaidMeaning:
     """The controls or the expression that an entry of the table [controls] means.
 
     Raises:
-        GivenError: the ARKit unit is unknown, or the name of an expression is invalid.
+        GivenError: the ARKit unit is unknown, the name of an expression is invalid, or an
+            expression is listed together with other meanings.
     """
     given = [value] if isinstance(value, str) else value
     if len(given) == 1 and given[0].startswith("@"):

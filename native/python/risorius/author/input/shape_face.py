@@ -24,7 +24,8 @@ from .matching import PREFIX
 from .obj import ObjMesh, ShapeFileError
 
 _LIP = re.compile(r"([UD])[LR]$")
-_Delta = tuple[str, str, Doubles | float]  # control, expression, share of the expression
+# Control, expression, and the control's fraction of the expression: float64[V, 1] or one number.
+_Delta = tuple[str, str, Doubles | float]
 _LEAST = 1e-6  # in sizes of the mesh; a vertex that moves less counts as resting
 
 
@@ -178,7 +179,7 @@ def combined_rows(
                     f"{where}: combination {name}: one of {known} was expected, found {part!r}"
                 )
         if any(not controls[part] for part in parts):
-            continue  # because an expression of the combination is left out
+            continue  # an expression of the combination is left out
         delta = together[name] - sum(shapes.expressions[part] for part in parts)
         for smaller, (_, part_delta) in zip(used, out, strict=True):
             if smaller < parts:
@@ -195,9 +196,10 @@ def make_shape_face(
     controls: Mapping[str, Sequence[str]],
     go_on: Callable[[], object] = lambda: None,
 ) -> Dna:
-    """Make a Dna with a mesh for each part and a blend shape for each control.
+    """Make a Dna with a mesh for each part and a blend shape for each control of an expression.
 
-    The joints are root and head, and eyes and jaw if `shapes` has joints for them.
+    The joints are root and head, and eyes and jaw if `shapes` has joints for them. Controls that
+    only turn these joints have no blend shape.
 
     Args:
         shapes: the mesh and its expressions.

@@ -240,7 +240,8 @@ def _options(spec: Spec, args: argparse.Namespace) -> RigOptions:
 
 
 def _size(spec: Spec, args: argparse.Namespace) -> None:
-    """Replace the head size of the spec by --height-mm or --scale, if one is given."""
+    """Replace the head size of the spec by --height-mm or --scale, if one is given; with --onto the
+    spec stays unchanged."""
     said = {"height_mm": args.height_mm, "scale": args.scale}
     said = {name: value for name, value in said.items() if value is not None}
     if args.onto is not None:

@@ -25,7 +25,8 @@ from ...mixing.regions import Masks
 from ...mixing.textures import mix_textures, texture_folder
 from ..files import CommandLineError, read, refuse_same_file
 
-# Options of `risorius author` that configure a new rig. A conformed face keeps its rig.
+# Options of `risorius author` that --conform excludes. Most configure a new rig, and a conformed
+# face keeps its rig.
 _NOT_ITS = (
     "names", "joints_only", "exact", "tolerance", "bound", "correctives", "report", "onto",
     "strength", "no_repair", "write_landmarks", "rig",
@@ -56,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, clock: Clock) -> int:
     """Run `risorius author --conform HEAD FACE.dna -o OUT.dna`: give FACE.dna the form of HEAD, and
-    write OUT.dna. Returns the exit code 0.
+    write OUT.dna and copies of the textures of FACE.dna. Returns the exit code 0.
 
     Args:
         args: arguments of `risorius author`.

@@ -31,7 +31,7 @@ _OWN = (
     "write_landmarks",
     "mesh",
     "rig",
-)  # options that need --onto
+)  # options that have no effect without --onto or --conform
 
 
 class Clock(Protocol):

@@ -111,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
 def _counts(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace
 ) -> dict[int, int]:
-    """Mesh index -> vertex count of the mesh that --mesh names; all meshes if it is not given.
+    """Mesh index -> vertex count, for the mesh that --mesh names, else for all of `surface`.
 
     Raises:
         CommandLineError: the face lacks this mesh.

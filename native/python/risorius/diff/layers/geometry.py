@@ -18,7 +18,8 @@ from .targets import compare_targets
 
 Numbers = npt.NDArray[np.uint32]
 
-# For each array: the noun for an element, the verb for its change, and its unit.
+# For each array: its name, the noun for an element, the verb for its change, and the kind of its
+# amount.
 _POINTS = (
     ("positions", "vertex", "moved", "length"),
     ("texture_coordinates", "UV", "changed", "number"),

@@ -26,7 +26,13 @@ class Comparison:
     """The rigs A and B with common numbers for their matched elements; the modules of the layers
     compare them.
 
-    exact: True: compare bit for bit; False after a conversion, which rounds.
+    Attributes:
+        a: the rig A.
+        b: the rig B.
+        report: receives the differences.
+        exact: True: compare bit for bit; False after a conversion, which rounds.
+        meshes_a: the meshes of A, read once.
+        meshes_b: the meshes of B, read once.
     """
 
     def __init__(self, a: risorius.Dna, b: risorius.Dna, report: Report, exact: bool = True):
@@ -176,7 +182,7 @@ class Comparison:
         return self.joints.in_a(joint) * stride + attribute
 
     def rows_in_b(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
-        """Common numbers of attributes of B's joints, see `rows_in_a`.
+        """Common numbers of attributes of B's joints: the joint's number * stride + attribute.
 
         Args:
             outputs: int[n], joint index * stride + attribute, as stored in the joint groups of B.
@@ -190,7 +196,7 @@ class Comparison:
 
         Args:
             numbers: int64[n], from `rows_in_a` or `rows_in_b`.
-            stride: attributes per joint, as in rows_in_a and rows_in_b.
+            stride: attributes per joint that these numbers were made with, 9 or 10.
         """
         names = ATTRIBUTES if stride == 9 else QUATERNION_ATTRIBUTES
         joint, attribute = np.divmod(numbers, stride)

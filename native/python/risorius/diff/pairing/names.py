@@ -74,9 +74,10 @@ def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
 def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
     """Match the joints of faces a and b.
 
-    Joints are matched by name. Unmatched joints with the same parent and neutral pose count as
-    renamed. If both faces have the same number of joints, unmatched joints with the same index and
-    neutral pose also count as renamed.
+    Joints are matched by name. An unmatched joint of each face counts as renamed if their parents
+    match, their neutral poses are equal, and neither face has another such joint. If both faces
+    have the same number of joints, unmatched joints with the same index and neutral pose also count
+    as renamed.
     """
     pairs = pair_names(a.joint_names, b.joint_names)
     neutral_a, neutral_b = _neutral(a), _neutral(b)

@@ -17,8 +17,11 @@ Bools = npt.NDArray[np.bool_]
 class Pairs:
     """Matched and unmatched positions of two lists A and B.
 
-    a, b: int64[pairs], positions of matched elements in each list, in the order of A.
-    only_a, only_b: int64, positions of elements without a match.
+    Attributes:
+        a: int64[pairs], ascending positions of matched elements in A.
+        b: int64[pairs], positions of the same elements in B.
+        only_a: int64, ascending positions of elements of A without a match.
+        only_b: int64, ascending positions of elements of B without a match.
     """
 
     a: Ints

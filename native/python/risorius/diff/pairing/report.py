@@ -21,7 +21,12 @@ class Difference(NamedTuple):
 
 
 class Report:
-    """Collects differences. Args: everything  True: lists of names are not shortened."""
+    """Collects differences.
+
+    Attributes:
+        differences: the differences, in the order in which they were added.
+        everything: True: lists of names are not shortened.
+    """
 
     def __init__(self, everything: bool = False) -> None:
         self.differences: list[Difference] = []
@@ -32,7 +37,8 @@ class Report:
         self.differences.append(Difference(layer, field, text))
 
     def listed(self, names: Sequence[str]) -> str:
-        """Names as a list that may be shortened, e.g. "jaw, brow and 40 more"."""
+        """Names as a list; of more than six names only five and the number of the others are
+        shown, unless `everything` is True."""
         if self.everything or len(names) <= _NAMES + 1:
             return ", ".join(names)
         return f"{', '.join(names[:_NAMES])} and {len(names) - _NAMES:,} more"

@@ -17,10 +17,13 @@ _OUTSIDE = 1 << 40  # numbers from here on stand for indices beyond the end of a
 class Space:
     """The elements of lists A and B with common numbers.
 
-    noun: noun for an element, e.g. "joint".
-    names: names by common number; A's names, then B's.
-    a, b: int64[elements of A], int64[elements of B], the common number of each element.
-    pairs: the matched elements.
+    Attributes:
+        noun: noun for an element, e.g. "joint".
+        plural: plural of the noun.
+        names: names by common number; A's names, then B's.
+        a: int64[elements of A], the common number of each element.
+        b: int64[elements of B], the common number of each element.
+        pairs: the matched elements.
     """
 
     def __init__(self, noun: str, names_a: Sequence[str], names_b: Sequence[str], pairs: Pairs):
@@ -32,11 +35,13 @@ class Space:
         self.b[pairs.b] = pairs.a
 
     def in_a(self, indices: npt.ArrayLike) -> Ints:
-        """The common numbers of elements of A by index."""
+        """The common numbers of elements of A by index; an index beyond the end gets a number of
+        its own, equal in both lists."""
         return _look_up(self.a, integers(indices))
 
     def in_b(self, indices: npt.ArrayLike) -> Ints:
-        """The common numbers of elements of B by index."""
+        """The common numbers of elements of B by index; an index beyond the end gets a number of
+        its own, equal in both lists."""
         return _look_up(self.b, integers(indices))
 
     def label(self, number: int) -> str:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 Doubles = npt.NDArray[np.float64]
 
 KINDS = ("minimal", "mixamo")
-_HEAD_HEIGHT = 1.5  # metres: the assumed height of a head whose joint is near the origin
+_HEAD_HEIGHT = 1.5  # metres: assumed height of a head's joint whose own height is not _STANDING
 _STANDING = (0.8, 2.4)  # metres: a head's joint between these heights is above a ground at 0
 _STRAIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Axes of Mixamo's bones, because poses of the web player TalkingHead assume them. Columns: the
@@ -153,7 +153,8 @@ def wanted(own: Iterable[str], kind: str) -> list[str]:
 
     Args:
         own: bones that the face has.
-        kind: one of KINDS: minimal adds the needed bones, mixamo all but the jaw; "": adds none.
+        kind: one of KINDS: minimal adds the needed bones, mixamo all but the jaw; "": adds none,
+            except a chest below an upper chest.
     """
     out = set(own)
     if kind == "mixamo":

@@ -39,7 +39,7 @@ ASKED: dict[str, dict[str, str | tuple[str, ...]]] = {
         ),
     },
 }  # fmt: skip
-"""Version -> required fields."""
+"""Version -> required field -> kind of its value, or the allowed values."""
 _MORE: dict[str, str | tuple[str, ...]] = {
     "version": TEXT, "copyrightInformation": TEXT, "contactInformation": TEXT,
     "references": TEXTS, "thirdPartyLicenses": TEXT, "otherLicenseUrl": TEXT,

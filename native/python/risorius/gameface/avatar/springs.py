@@ -34,13 +34,13 @@ class Spring:
 
     Attributes:
         name: name of the chain.
-        nodes: numbers of its nodes, from the root to the tip; the tip moves no vertex.
+        nodes: numbers of its nodes, from the root to the tip, which only ends the chain.
         colliders: indices of the colliders that the chain does not enter.
         hit: radius in metres of the sphere around each node that collides with the colliders.
         stiffness: how strongly the chain returns to its rest pose, 0 to 4.
-        drag: share of the motion that is lost, 0 to 1.
+        drag: fraction of the swing's velocity that is lost in a step of the simulation, 0 to 1.
         gravity: strength of gravity, 0 to 2.
-        down: direction of gravity in the scene.
+        down: direction of gravity in the scene's axes.
         center: number of a node whose motion does not swing the chain; -1 for none.
         is_branch: whether the chain begins at a node of another chain; VRM 0.x lists only the
             chain that it branches from.

@@ -10,7 +10,7 @@ from typing import Any
 from ...importing.gltf import Document
 from ..glb import Glb
 
-_ENDING = "texture"  # of the keys of a material that refer to textures
+_ENDING = "texture"  # a key of a material with this ending, in any case, refers to a texture
 _DEEPEST = 32
 _OF_VRM_1 = "VRMC_materials_"
 

@@ -52,8 +52,9 @@ class BodyMesh:
     Attributes:
         name: name of the node; the mesh's name if the node has none.
         also: name of the mesh.
-        joints: numbers of the nodes that are the joints of its skin.
-        pieces: its primitives.
+        joints: numbers of the nodes that are the joints of its skin; without a skin, the number of
+            the node that moves it.
+        pieces: its primitives that have vertices.
         targets: names of its morph targets.
     """
 

@@ -26,8 +26,9 @@ Doubles = npt.NDArray[np.float64]
 
 SUFFIXES = (".glb", ".gltf", ".vrm")
 _TALLEST = 20.0  # units from feet to head: a taller body is in centimetres
-_HANGING = 25.0  # degrees below the horizontal of an arm that is no T-pose
-_OWN_FACE = 3  # targets with names of expressions that make a face
+_HANGING = 25.0  # degrees: an arm that hangs farther below the horizontal is not in a T-pose
+# smallest number of morph targets named after expressions that makes a mesh a face
+_OWN_FACE = 3
 
 # Names of expressions in older ARKit rigs and in VRoid.
 _OLDER = (
@@ -180,11 +181,15 @@ def _scale_of(at: Mapping[str, Doubles]) -> float:
 
 
 def _facing(at: Mapping[str, Doubles], name: str) -> float:
-    """1 for a body that faces along +z, -1 for one that faces along -z, as VRM 0.x prescribes.
+    """1 for a body that faces along +z or has no pair of bones that shows it, -1 for one that faces
+    along -z, as VRM 0.x prescribes.
 
     Args:
         at: VRM name of a bone -> float64[3], its position in the file.
         name: name of the file for errors.
+
+    Raises:
+        GameFaceError: the head is not above the hips.
     """
     if "hips" in at and not at["head"][1] > at["hips"][1]:
         raise GameFaceError(
@@ -226,7 +231,7 @@ class _Nodes:
 
 
 def _rotation(matrix: Doubles) -> Doubles:
-    """The rotation part of a matrix that rotates and scales."""
+    """The rotation part of a matrix that rotates and scales; the identity for a singular matrix."""
     if not abs(np.linalg.det(matrix)) > 1e-30:
         return np.eye(3)
     left, _, right = np.linalg.svd(matrix)

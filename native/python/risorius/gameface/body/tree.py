@@ -15,7 +15,7 @@ from ..avatar import humanoid
 
 Doubles = npt.NDArray[np.float64]
 
-_MOST = 20_000  # nodes of a file
+_MOST = 20_000  # largest number of nodes of a file
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class Tree:
 
 
 def find_tree(document: Document) -> Tree:
-    """The nodes of the first scene, or all nodes if the file has no scene.
+    """The nodes of the file's default scene (the first one if the file names none), or all nodes if
+    the file has no scene.
 
     Args:
         document: the file of the body.

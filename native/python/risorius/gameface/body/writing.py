@@ -114,7 +114,8 @@ class _Writer:
         self._targets = dict[int, list[dict[str, int]]]()
 
     def skin(self, joints: list[int]) -> int:
-        """The number of the exported skin with these joints. Args: joints: nodes of the body."""
+        """The number of the exported skin with these joints; it is added if there is none. Args:
+        joints: numbers of nodes in the body's file."""
         own = tuple(self._body.of_node[joint] for joint in joints)
         skins = self._glb.table.setdefault("skins", [])
         if own not in self._skins:

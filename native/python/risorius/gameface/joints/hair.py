@@ -23,13 +23,15 @@ Ints = npt.NDArray[np.int64]
 HANGS = 0.04  # metres between the root and the tip of a card that swings
 _BUNDLES = 12
 _SEGMENT = 0.05  # metres between joints
-_JOINTS = (2, 4)
+_JOINTS = (2, 4)  # fewest and most joints of a chain
 _WIDEST = 0.15  # metres: a wider piece is hair in one piece, which no chain can follow
-_BAND = 0.015  # metres above and below a joint whose hair it lies in
-_FIRM = 0.3  # share of a card, from its root, over which it begins to swing
-_FEWEST = 12  # roots that a sphere is fitted to
-_SKULL = (0.05, 0.11)  # metres, radius
-_HIT = 0.01  # metres, radius of a joint
+# metres: vertices this far above or below a joint have weight 1/e in the mean that places the joint
+_BAND = 0.015
+# fraction of a card's height, from its root, in which the weight passes from the head to the chain
+_FIRM = 0.3
+_FEWEST = 12  # smallest number of hair roots to which a sphere is fitted
+_SKULL = (0.05, 0.11)  # metres: smallest and largest radius of the skull's sphere
+_HIT = 0.01  # metres: radius of the sphere around a joint that collides with the skull
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from .skeleton import Skeleton
 Doubles = npt.NDArray[np.float64]
 
 _EYES = ("leftEye", "rightEye")
-_DEEP = 0.03  # metres
+_DEEP = 0.03  # metres: if eyes and head joint differ more in depth, the head joint decides
 
 
 def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
@@ -25,7 +25,8 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
     The midpoint of the face's eyes is moved to the midpoint of the body's eye bones. If the face or
     the body has no eye bones, the head joint is moved to the head bone. The motion in depth is also
     the head joint's if the depths of the eyes in both heads differ by more than 3 cm. The face's
-    root is replaced by the node above the body's neck.
+    root is replaced by the node above the body's neck. Other bones below the root, except neck and
+    head, become children of the head.
 
     Args:
         skeleton: joints of the face alone.

@@ -62,9 +62,11 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
 def infer_base(codes: Sequence[Timecode]) -> int | None:
     """Frames per second that the timecodes count, or None if it cannot be inferred.
 
-    A rate measured from the timecodes wins. It cannot be measured if the timecodes never reach the
-    next second, or if too many rows are lost around each new second. Then the largest frame number
-    decides, provided that only one usual rate fits it.
+    If every frame number is 0, the result is 30, because any rate gives the same times. Else a rate
+    measured from the timecodes wins. It cannot be measured if the timecodes never reach the next
+    second, or if too many rows are lost around each new second. Then the largest frame number
+    decides: 30 to 59 means 60 frames per second, 29 in a take of 2 s or more means 30, and other
+    numbers give None.
     """
     frames = np.array([code.frames for code in codes])
     seconds = np.array([3600 * c.hours + 60 * c.minutes + c.seconds for c in codes])
@@ -120,7 +122,8 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     Args:
         codes: from `parse`, in the order of the frames.
         base: frames per second that the timecode counts: 30 for 29.97.
-        is_true_rate: False if a second of timecode lasts 1.001 s, as at 23.976, 29.97, 59.94.
+        is_true_rate: False if a second of timecode lasts 1.001 s, as at 23.976, 29.97, 59.94. It
+            is ignored if any timecode is drop-frame: a second then lasts 1.001 s.
 
     Returns:
         float64[codes].

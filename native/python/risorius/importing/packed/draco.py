@@ -29,7 +29,7 @@ class DracoMesh:
     """The triangles and attributes of an unpacked mesh.
 
     Attributes:
-        triangles: int64[n, 3].
+        triangles: int64[n, 3], indices of vertices.
     """
 
     def __init__(self, packed: bytes) -> None:

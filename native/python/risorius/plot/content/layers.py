@@ -116,7 +116,9 @@ def _entries(data: bytes) -> list[Layer]:
 
 
 def _with_gaps(layers: list[Layer], end: int) -> list[Layer]:
-    """The layers, followed by an entry for bytes outside all layers."""
+    """The layers, followed by one entry if some of the file's `end` bytes are in no layer.
+
+    The entry's size is the number of these bytes; its offset is the number of all other bytes."""
     covered, at = 0, 0
     for layer in layers:
         stop = min(end, layer.offset + layer.size)

@@ -36,7 +36,14 @@ _MARGIN = 0.04
 
 @dataclass(frozen=True)
 class Scene:
-    """The data of one view, in view axes (right, up, front) and file units."""
+    """The data of one view, in view axes (right, up, front) and file units.
+
+    Attributes:
+        shape: the meshes.
+        joints: float64[J, 3], positions of all joints.
+        shown: indices of the joints that are drawn.
+        bones: int64[n, 2], parent and child of each drawn bone.
+    """
 
     shape: shade.Surface
     joints: Floats
