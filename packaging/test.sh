@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # test.sh: builds everything and runs all tests: native, Python and Blender. All Blender tests run in bpy 4.5
-# and in each `blender` of version 4.2 or newer on PATH or in BLENDER=. A fast subset runs in bpy 4.2 and
+# and in the first `blender` on PATH and in BLENDER=, if they are 4.2 or newer. A fast subset runs in bpy 4.2 and
 # 5.0 if pip can fetch them. At the end, prints the duration of each stage, the results, and the parts that
 # did not run with the reason. Exit code 0 only if all tests passed.
 # packaging/check/blender/matrix.sh runs all Blender tests in all versions.

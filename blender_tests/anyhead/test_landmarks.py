@@ -61,6 +61,31 @@ def test_they_stand_on_a_head_that_is_turned_and_scaled(head, package):
     assert {point.state for point in shown(head).values()} == {"FOUND"}
 
 
+def test_vertex_groups_tell_the_package_where_the_head_is(monkeypatch):
+    item, asked = plain_head(), []
+    for name, first, weight in (("DEF-head", 40, 0.9), ("DEF-jaw", 20, 0.4), ("hat", 0, 1.0)):
+        item.vertex_groups.new(name=name).add(range(first, 100), weight, "REPLACE")
+    part = scene.submodule("native").part
+    found = part("anyhead.landmarks.marks").Landmarks()
+    found.points.update({name: np.array(place) for name, place in PLACES.items()})
+
+    def find(_surface, hints, _progress):
+        asked.append(hints)
+        return found
+
+    monkeypatch.setattr(part("anyhead.landmarks.find"), "find_landmarks", find)
+    assert risorius.find_landmarks() == {"FINISHED"}
+    head = scene.submodule("scene.anyhead.finding").read(bpy.context, item, ())
+    own = head.parts[0].mesh.positions[40:100]
+    assert {name: rows.tolist() for name, rows in head.parts[0].groups.items()} == {
+        "DEF-head": own.tolist()
+    }
+    low, high = asked[0].box
+    assert (low < own.min(axis=0)).all()
+    assert (high > own.max(axis=0)).all()
+    assert (high - low).max() < 2 * np.ptp(own, axis=0).max()
+
+
 def test_what_is_moved_by_hand_stays_and_is_told_to_the_package(head, package):
     risorius.find_landmarks()
     point = shown(head)["eye_inner_L"].item

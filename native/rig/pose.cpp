@@ -20,7 +20,9 @@ std::vector<simd::Rows> rows_of_groups(const Rig& rig) {
   return all;
 }
 
-// The joints that no Euler angles rotate, if rotations in poses are quaternions; otherwise none.
+// If poses have quaternions: the joints whose quaternions are not computed from Euler angles at any
+// LOD. An evaluation first sets them to the identity; later stages may rotate them. If poses have
+// Euler angles: none.
 std::vector<std::uint16_t> straight_joints(const Rig& rig) {
   if (rig.joint_stride != 10) return {};
   std::vector<bool> turns(rig.joint_count);

@@ -86,7 +86,7 @@ class Table:
 
 
 def single(clip: risorius.Clip, face: Face, lod: int) -> Clock:
-    """Time of Rig.evaluate, frame by frame."""
+    """Total time to evaluate the clip with one call of Rig.evaluate for each frame."""
     raw, _ = clip.raw_controls(face.rig.raw_control_names)
     with Clock() as clock:
         for frame in raw:

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Compares the evaluator with one scalar CSR (compressed sparse row) matrix of all joint groups:
 //   rig_bench FILE.dna [FRAMES20.f32 FRAMES60.f32 FRAMES_ALL.f32] [--sweep] [--progress]
-//   [--clip FRAMES.f32] [options of the library]
-// Frames are little-endian float32[frames, raw controls]; without files, frames are generated.
+//   [--clip FRAMES.f32] [options of Google Benchmark]
+// FRAMES20, FRAMES60 and FRAMES_ALL have 20, 60 and all raw controls active (not 0); without these
+// files, such frames are generated. Files are little-endian float32[frames, raw controls].
+// --progress shows the name of the running benchmark. --clip adds the frames of a real clip.
 // --sweep instead measures how time grows with the size of the work, and prints a row for each
 // point: name, x (the size), us, us of csr, us of only reading the columns of active controls.
 #include <benchmark/benchmark.h>

@@ -36,7 +36,7 @@ def _raw_record(name: bytes, values: bytes) -> bytes:
 
 
 def _placed(head: bytes, name: bytes, inner: bytes) -> bytes:
-    """`head` and a record that contains `inner`, with end offsets that count from the file's begin.
+    """`head` and a record that contains `inner`; end offsets count from the file's beginning.
 
     Args:
         head: the beginning of the file.

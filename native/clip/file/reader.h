@@ -42,7 +42,7 @@ class Reader {
   /// Number of bytes of the file that belong to the clip. Only a file that was cut or damaged has
   /// more: the bytes from the first incomplete or damaged block on.
   std::uint64_t byte_count() const { return end_; }
-  /// First frame of each block, followed by the number of frames.
+  /// Index of the first frame of each block; the last entry is frame_count().
   const std::vector<std::uint64_t>& block_starts() const { return starts_; }
 
   /// Fails if read() would reject the range of frames, a control, or the number of values. Call it

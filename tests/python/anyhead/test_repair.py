@@ -126,6 +126,32 @@ def test_closed_lids_are_lifted_out_of_a_cornea_that_turns_below_them(skin, fitt
     assert lids.cut(out, turn) < 0.005
 
 
+def test_a_cornea_that_comes_through_a_lid_is_no_gap_between_the_edges(head, skin, fitted):
+    """The lid is lifted over the cornea, and not turned down by the height of the visible part."""
+    ball, blink = fitted.eyes["L"], head.ways["eyeBlinkL"]
+    arm = ball.points - EYE
+    front = np.clip(8 * arm[:, 2:] / RADIUS - 7, 0, 1)
+    lids = find_eyelids(skin, replace(ball, points=ball.points + 0.15 * front * arm, _surface=[]))
+    assert lids.gap(blink) > 0.9
+    assert lids.cut(blink) > 0.1
+    out = lids.closed(blink)
+    assert lids.gap(out) <= 0.005
+    assert lids.cut(out) < 0.005
+    assert np.linalg.norm(out - blink, axis=1).max() < 0.3
+
+
+def test_edges_of_lids_that_rest_inside_the_eye_come_out_where_they_close(head, skin, fitted):
+    ball, blink, arm = fitted.eyes["L"], head.ways["eyeBlinkL"], skin.points - EYE
+    length = np.linalg.norm(arm, axis=1)
+    edge = (np.hypot(arm[:, 0] / 1.05, arm[:, 1] / 0.5) < 1.02) & (length < 1.5 * RADIUS)
+    inside = np.where(edge, 0.98 * RADIUS / length, 1.0)[:, None]
+    lids = find_eyelids(Surface(EYE + inside * arm, skin.triangles), ball)
+    assert lids.gap(blink) > 0.5
+    out = lids.closed(blink)
+    assert lids.gap(out) <= 0.005
+    assert lids.cut(out) < 0.005
+
+
 def test_an_eye_behind_skin_has_no_lids(skin, fitted):
     hidden = fitted.eyes["L"]
     back = type(hidden)("L", hidden.middle * [1, -1, 0.8], RADIUS, hidden.points, hidden.triangles)
@@ -246,6 +272,24 @@ def test_a_face_without_eyes_and_lips_stays_as_it_is(head, skin):
     out = repair(skin, head.faces, bare, None, None, ways, {})
     assert np.array_equal(out.expressions["browDownL"], ways["browDownL"])
     assert out.report.rows == {}
+
+
+def test_lips_of_long_triangles_that_touch_have_no_gap():
+    """Only inner points of the sides lie on the line between the lips in most columns."""
+    x = np.arange(-3.2, 3.21, 0.8)
+    rows = [np.stack([x + shift, np.full(9, y), np.full(9, 8.0)], axis=1)
+            for y, shift in ((0, 0), (0.7, 0.4), (0, 0.3), (-0.7, -0.1))]  # fmt: skip
+    right = np.arange(8)
+    strips = [np.stack([[a, a + 1, b], [a + 1, b + 1, b]])[:, ::order].transpose(2, 0, 1)
+              for a, b, order in ((right, right + 9, 1), (right + 18, right + 27, -1))]  # fmt: skip
+    skin = Surface(np.concatenate(rows), np.concatenate(strips).reshape(-1, 3))
+    low = np.repeat([0.0, 1.0], 18)[:, None]
+    ways = {"jawOpen": low * [0, -1, 0], "mouthFunnelUL": np.full((36, 3), 0.2)}
+    lips = Lips(skin, ways, np.array([[-HALF, 0, 8], [HALF, 0, 8]]))
+    assert lips.found
+    assert np.abs(lips.rest.gap).max() < 0.01
+    apart = skin.points + 0.1 * low * [0, -1, 0]
+    assert lips.meeting(apart).gap == pytest.approx(0.1, abs=0.01)
 
 
 def test_lips_that_a_triangle_connects_are_counted_as_welded(head, skin):

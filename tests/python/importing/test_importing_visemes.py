@@ -193,6 +193,6 @@ def test_a_table_that_is_said_to_be_rhubarbs_is_not(tmp_path):
         importing.AnimationFileError, match="shape A-H or X in each line .* a table"
     ):
         read(tmp_path, "time,jawOpen\n0,1\n", kind="rhubarb")
-    # Two columns of letters are no viseme track, nor are letters next to numbers.
+    # A table is a viseme track only if exactly one column has mouth shapes; this one has two.
     with pytest.raises(importing.AnimationFileError, match="columns with curves were expected"):
         read(tmp_path, "time,a,b\n0,A,B\n1,C,D\n")

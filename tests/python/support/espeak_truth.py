@@ -33,8 +33,8 @@ CLASSES = {
 }
 CLASS_OF = {name: viseme for viseme, names in CLASSES.items() for name in names.split()}
 
-# Sounds that begin with a closed mouth. espeak reports the time at which the mouth opens again; the
-# silence before it belongs to the previous sound.
+# Sounds that begin with a closure of the lips or of the tongue. espeak reports the time at which
+# the closure opens; in espeak's times, the silence before it belongs to the previous sound.
 STOPS = {"p", "b", "t", "d", "k", "g", "tS", "dZ", "t2"}
 
 

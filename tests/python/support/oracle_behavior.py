@@ -41,7 +41,11 @@ def unit(q):
 
 
 def from_euler(sequence, signs, angles):
-    """Quaternions [..., 4] of Euler angles [..., 3] in radians, applied in the sequence's order."""
+    """Quaternions [..., 4] of Euler angles [..., 3] about x, y and z, in radians.
+
+    The rotations are about fixed axes. `sequence` is their order: "xyz" rotates about x first.
+    `signs` has a factor for the angle about each of x, y and z: 1 or -1.
+    """
     angles = np.asarray(angles, float)
     q = np.broadcast_to([0, 0, 0, 1.0], (*angles.shape[:-1], 4))
     for axis in ("xyz".index(a) for a in sequence):

@@ -19,8 +19,9 @@ from .board_table import BoardTable, Doubles
 
 _SWEEPS = 40  # most sweeps; controls that share outputs halve their error in each
 _ENOUGH = 1e-7  # a sweep that moves no control by more ends the fit
-# A raw control closer than this to its goal counts as reached. A pose is refitted if its sum of
-# squared differences is larger, and a refit counts only if it lowers this sum by more.
+# Limit of differences and of sums of squared differences. A raw control counts as reached if it
+# differs from its goal by no more than _RIGHT. A pose is refitted if its sum of squared differences
+# exceeds _RIGHT, and a refit counts only if it lowers this sum by more than _RIGHT.
 _RIGHT = 1e-9
 _REST = 1e-10  # cost per unit of distance from rest: decides between equally good values
 

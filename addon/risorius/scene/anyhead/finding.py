@@ -83,7 +83,8 @@ def needed() -> frozenset[str]:
 def _search(head: Head, progress: Callable[[float], bool]) -> native.Landmarks:
     """Find the landmarks of a head; landmarks that the user placed are kept."""
     module = native.part("anyhead.landmarks.find")
-    hints = module.Hints(where=head.parts[0].name, marks=dict(head.fixed))
+    box = native.part("anyhead.standing").named_box(head.parts)
+    hints = module.Hints(where=head.parts[0].name, marks=dict(head.fixed), box=box)
     found: native.Landmarks = module.find_landmarks(surface_of(head.parts[0]), hints, progress)
     return found
 

@@ -61,8 +61,9 @@ def images_as_files() -> Iterator[None]:
         if image.library is not None:
             raise FaceError(
                 told(
-                    "rename the linked image {name} in its file: the name must not "
-                    "contain / or other characters that file names cannot have",
+                    "rename the linked image {name} in the .blend file from which it is "
+                    "linked: the name must not contain / or other characters that file "
+                    "names cannot have",
                     name=printable(image.name),
                 )
             )

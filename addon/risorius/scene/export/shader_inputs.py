@@ -136,7 +136,7 @@ def source(shader: Node, *names: str) -> Source:
 
 def normal_image(shader: Node) -> Node | None:
     """The image node of a shader's normal map, also below Bump nodes. None if there is none, or
-    if its image is tiled or not mapped by the UV map."""
+    if its image is tiled (UDIM) or mapped otherwise than by the mesh's default UV map."""
     socket = shader.inputs.get("Normal")
     while socket is not None and (feeding := _feeding(socket)) is not None:
         node = feeding.node

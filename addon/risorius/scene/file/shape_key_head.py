@@ -157,9 +157,29 @@ def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native
     placed = points.reshape(-1, 3).astype(np.float64) @ turn_of(context, item).T
     placed += _axes(context) @ np.array(apart, np.float64)
     out = heads.HeadPart(item.name, author.ObjMesh(placed, *_polygons(mesh)), source=item.name)
+    out.groups = _groups(item, mesh, placed)
     if whole is not None:
         bpy.data.meshes.remove(whole)
     return out
+
+
+def _groups(item: MeshObject, mesh: bpy.types.Mesh, points: Doubles) -> dict[str, Doubles]:
+    """Name of each vertex group -> float64[n, 3], positions of the vertices with a weight above
+    0.5. Groups whose names tell nothing about a head are left out.
+
+    Args:
+        item: the object, which has the names of the groups.
+        mesh: its mesh, perhaps with modifiers applied, which has the weights.
+        points: float64[V, 3], the positions of the mesh's vertices.
+    """
+    place_of = native.part("anyhead.landmarks.groups").place_of
+    names = {group.index: group.name for group in item.vertex_groups if place_of(group.name)}
+    held: dict[str, list[int]] = {name: [] for name in names.values()}
+    for vertex in mesh.vertices if names else ():
+        for row in vertex.groups:
+            if row.weight > 0.5 and row.group in names:
+                held[names[row.group]].append(vertex.index)
+    return {name: points[own] for name, own in held.items() if own}
 
 
 def _mirrored(context: Context, item: MeshObject) -> bpy.types.Mesh | None:

@@ -251,8 +251,8 @@ def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
         raise SpokenError(
             told(
                 (
-                    "{action} moves no slider of the mouth: if the face board moves the "
-                    "face, the keys of the voice are on the handles of the board"
+                    "the voice of {action} cannot be corrected: the action has no keys for "
+                    "sliders of the mouth, perhaps because the keys are on the face board"
                 ),
                 action=action.name,
             )

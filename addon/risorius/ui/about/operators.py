@@ -133,7 +133,7 @@ class RISORIUS_OT_self_test(Operator):
 
 
 class RISORIUS_OT_hide_hints(Operator):
-    """Hide the first steps; the preferences show them again"""
+    """Hide the first steps; the option First Steps in the preferences shows them again"""
 
     bl_idname = "risorius.hide_hints"
     bl_label = "Hide First Steps"

@@ -178,7 +178,7 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
         row.prop(self, "use_simple_materials")
         row = layout.row()
         row.active = self.use_materials and self.use_textures
-        words.prop_or(row.column(), self, "texture_folder", "", "Empty: beside the file")
+        words.prop_or(row.column(), self, "texture_folder", "", "Empty: search beside the DNA file")
         layout.prop(self, "use_frame_view")
 
 

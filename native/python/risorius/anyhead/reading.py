@@ -56,13 +56,17 @@ def _obj_parts(path: Path) -> list[HeadPart]:
     """The objects of an OBJ file as parts; a file with fewer than two objects is split only if
     its islands have different materials."""
     mesh = read_obj(path)
-    names, of_face = _objects(path)
-    if len(names) < 2 or len(of_face) != len(mesh.faces):
-        whole = with_materials(path, HeadPart(path.stem, mesh, source=path.stem))
-        return [_welded(part) for part in whole]
-    parts = taken_apart(HeadPart(path.stem, mesh, source=path.stem), names, of_face)
-    for part in parts:
-        part.source, part.polygons = part.name, None
+    names, of_face, groups = _objects(path)
+    known = len(of_face) == len(mesh.faces)
+    if len(names) < 2 or not known:
+        parts = with_materials(path, HeadPart(path.stem, mesh, source=path.stem))
+    else:
+        parts = taken_apart(HeadPart(path.stem, mesh, source=path.stem), names, of_face)
+        for part in parts:
+            part.source, part.polygons = part.name, None
+    for name, own in groups.items() if known else ():
+        corners = np.concatenate([mesh.faces[f] for f in own])
+        parts[0].groups[name] = mesh.positions[np.unique(corners)]
     return [_welded(part) for part in parts]
 
 
@@ -71,15 +75,22 @@ def _welded(part: HeadPart) -> HeadPart:
     return part
 
 
-def _objects(path: Path) -> tuple[list[str], Ints]:
-    """The distinct names of a file's objects, and int64[F]: the object index of each polygon."""
+def _objects(path: Path) -> tuple[list[str], Ints, dict[str, list[int]]]:
+    """The distinct names of a file's objects; int64[F]: the object index of each polygon; name of a
+    group (line g) -> indices of its polygons."""
     names: dict[str, int] = {}
-    rows, own = [], ""
+    groups: dict[str, list[int]] = {}
+    rows: list[int] = []
+    own, inside = "", list[str]()
     data = io.BytesIO(read_file(path, MESH, found=True))
     for line in io.TextIOWrapper(data, encoding="utf-8", errors="replace"):
         kind, _, rest = line.strip().partition(" ")
         if kind == "o":
             own = rest.strip() or path.stem
+        elif kind == "g":
+            inside = rest.split()
         elif kind == "f":
+            for name in inside:
+                groups.setdefault(name, []).append(len(rows))
             rows.append(names.setdefault(own or path.stem, len(names)))
-    return list(names), np.array(rows, np.int64)
+    return list(names), np.array(rows, np.int64), groups

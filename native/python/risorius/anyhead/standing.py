@@ -18,6 +18,7 @@ from .balls import paired_balls
 from .errors import AnyHeadError
 from .form.standing import CHIN, TOP
 from .landmarks.find import Found, Hints, find_form
+from .landmarks.groups import Box, head_box
 from .landmarks.marks import LandmarkError, Landmarks
 from .surface import Surface
 from .telling import Progress
@@ -80,7 +81,7 @@ def stand(
     up, front = (axis_of(word) if word else None for word in (wishes.up, wishes.front))
     given = marks.points if marks is not None else {}
     skin, notes = _skin_of(where, able, wishes.mesh), []
-    hints = Hints(where, given, up, front, paired_balls(able))
+    hints = Hints(where, given, up, front, paired_balls(able), box=named_box(parts))
     found, backwards = _found(skin, hints, progress)
     if backwards:
         notes.append("the polygons faced inwards and were flipped")
@@ -108,6 +109,16 @@ def stand(
         found.landmarks,
         [*notes, *odd, *found.landmarks.notes],
     )
+
+
+def named_box(parts: Sequence[HeadPart]) -> Box | None:
+    """A box around the head by the names of meshes and groups; None if no name tells.
+
+    Args:
+        parts: the meshes of the head or body in one space.
+    """
+    rows = [(part.name, part.mesh.positions) for part in parts]
+    return head_box([*rows, *(row for part in parts for row in part.groups.items())])
 
 
 def _found(skin: Surface, hints: Hints, progress: Progress | None) -> tuple[Found, bool]:

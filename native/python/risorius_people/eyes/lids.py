@@ -23,7 +23,7 @@ _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 # Fraction of the data's blink by which the skin around the lids moves. The lids' own fraction
 # depends on how far the data's lids are shut, which the rest pose does not show.
-_AROUND = 0.55
+_AROUND = 0.6
 _STEPS = 10  # iterations that lay the rim on the eye
 # mm by which a full look lifts the lids off the ball. Blend shapes move the lids straight and not
 # round the ball, so without this distance they would be inside the ball at half of the look.
@@ -266,7 +266,7 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     off = closed[ROOT, UPPER] - whole[ROOT, UPPER]
     outer = whole[:ROOT, UPPER] + _FADE[::-1, None, None] * off
     closed[:ROOT, UPPER] = outer
-    closed[:, LOWER] += (_AROUND * (1 - rows))[:, :, None] * way[:, LOWER]
+    closed[:, edge] += (_AROUND * (1 - rows))[:, :, None] * way[:, edge]
     closed[ROOT + 4, UPPER] = whole[ROOT + 4, UPPER]
     closed = lids.seated(closed)
     plain = _scaled(lids, blink)

@@ -145,7 +145,11 @@ class Turning:
         self._normals = self._normals_at(self._skin)
 
     def _normals_at(self, skin: Floats) -> Floats:
-        """float64[n, 3]: unit normals of the skin at the cards' places."""
+        """float64[n, 3]: for each vertex of the cards, the unit normal at its place on the skin.
+
+        Args:
+            skin: float64[V, 3], positions of the skin's vertices.
+        """
         a, b, c = (skin[self._triangles[:, k]] for k in range(3))
         faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
         sums = [np.bincount(self._rows, faces[:, k], self._count + 1) for k in range(3)]

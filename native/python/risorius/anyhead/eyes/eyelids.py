@@ -15,7 +15,7 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ...base.easing import smooth_step
 from ..surface import Surface
 from .eyeballs import Eyeball
-from .opening import FAR, Opening, find_opening, gap_rays, near_eye, visible_gap
+from .opening import FAR, Mask, Opening, find_opening, gap_rays, near_eye, visible_gap
 
 _RADIUS_MM = 12.0  # radius of a human eye; the lengths in mm below are scaled to the actual eye
 _BAND = 3.0  # mm from the edge: vertices up to here move with the edge
@@ -40,6 +40,7 @@ _LOOKS = 64  # rays per axis of the grid that finds where the eye comes through 
 _LIFTS = 4  # largest number of rounds that lift the triangles of lids out of the eye
 _SCALES = (0.6, 2.5)  # least and largest factor of the transferred turn
 _SPREAD = 6  # smoothing rounds that spread a lift to neighbouring vertices
+_DIP = 1.0  # mm: deeper skin is not the part of a lid through which the eye comes
 _MOVED = 0.1  # mm: smaller motions are ignored
 _WIDE = np.radians(75.0)  # largest angle above or below the front of a lid vertex
 
@@ -93,6 +94,8 @@ class Eyelids:
             indexing="ij",
         )
         self._looks = opening.frame.rays(*grid).reshape(-1, 3)
+        off = np.abs(grid[0].ravel()[:, None] - opening.across)
+        self._look_columns: Ints = off.argmin(axis=1)  # the column closest to each ray
         ball.keep(self._looks)
         self._through = gap_rays(opening)
         ball.keep(self._through)
@@ -180,14 +183,17 @@ class Eyelids:
         """
         rest_up = self.opening.frame.angles(self.rest)[1]
         points = self.rest + displacement[self.vertices]
-        best, least = points, np.inf
-        for number in range(_ROUNDS):
-            apart = self._apart(points, turn)
-            if apart.any():
-                points = self._approached(points, turn, apart, rest_up if number == 0 else None)
-            elif number or self._lacks(points, turn, 0.0).max(initial=0.0) <= _CUT * self.mm:
-                break  # closed lids that cut into the eye are lifted first
+        # A cornea that comes through a lid is no gap between the edges, so the lids are lifted
+        # before the edges are turned towards each other.
+        if self._lacks(points, turn, 0.0).max(initial=0.0) > _CUT * self.mm:
             points = self._lifted(points, turn)
+        best, least = points, max(self._gap(points, turn), _ENOUGH * self.mm)
+        for number in range(_ROUNDS):
+            apart, bare = self._apart(points, turn)
+            if not apart.any():
+                break
+            points = self._approached(points, turn, apart, rest_up if number == 0 else None)
+            points = self._lifted(points, turn, bare)
             wrong = self._gap(points, turn)
             if wrong < least:
                 best, least = points, wrong
@@ -278,16 +284,17 @@ class Eyelids:
         edges = np.minimum(low, high) - beside, np.maximum(low, high) + beside
         return visible_gap(self._posed(points), self.ball, self.opening, self._through, edges, turn)
 
-    def _apart(self, points: Doubles, turn: Doubles | None) -> Doubles:
+    def _apart(self, points: Doubles, turn: Doubles | None) -> tuple[Doubles, Mask]:
         """float64[columns]: for each column of the opening, the angle in radians by which the edges
         have to approach each other; negative if they overlap by more than closed lids may; zeros if
-        an edge was found in no column."""
+        an edge was found in no column. bool[columns]: whether the eye is visible although the edges
+        meet, because it comes through a lid."""
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         unit = self.mm / self.ball.radius
         apart = high - low
         known = ~np.isnan(apart)
         if not known.any():
-            return np.zeros(len(apart))
+            return np.zeros(len(apart)), known
         columns = np.arange(len(apart))
         apart = np.interp(columns, columns[known], apart[known])
         # In columns in which the eye is still visible, the edges approach by an additional overlap.
@@ -296,7 +303,7 @@ class Eyelids:
         through = np.minimum(apart + _THROUGH * unit, 0.0)
         most = self.opening.high - self.opening.low  # limits the motion near the eye corners
         even = np.minimum(_even(lacks), np.maximum(apart, 0.0) + _OVER * unit)
-        return np.clip(even + _even(through), -most, most)
+        return np.clip(even + _even(through), -most, most), (seen > 0) & (apart < 0)
 
     def _fade(self, most: float) -> Doubles:
         """float64[n], 0 to 1: the fraction of the edge's rotation by which each lid vertex rotates.
@@ -360,10 +367,12 @@ class Eyelids:
         far[column[best]] = ((1 - s) * away[a] + s * away[b])[best]
         return out, far
 
-    def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
+    def _lacks(
+        self, points: Doubles, turn: Doubles | None, above: float, bare: Mask | None = None
+    ) -> Doubles:
         """float64[n]: distance by which the triangles of each vertex must move outwards to be
         `above` away from the eye's surface. Only triangles that are outside the eye in the rest
-        pose count."""
+        pose count, and in the columns `bare` (see _apart) also triangles just below its surface."""
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
         tree = self._posed(points)
         rays = self._looks
@@ -372,21 +381,25 @@ class Eyelids:
         triangle, height = np.asarray(triangle), begin - np.asarray(distance)
         corners = self._own[np.maximum(triangle, 0)]
         clear = (corners >= 0).all(axis=1)
-        clear[clear] = self._outside[corners[clear]].all(axis=1)
-        hit = (triangle >= 0) & clear & (height > 0.7 * ball.radius)
-        lack = ball.reach(rays, turn)[hit] + above - height[hit]
+        outside = self._outside[corners].all(axis=1)
+        lack = ball.reach(rays, turn) + above - height
+        if bare is not None and bare.any():
+            outside |= bare[self._look_columns] & (lack < _DIP * self.mm)
+        hit = (triangle >= 0) & clear & outside & (height > 0.7 * ball.radius)
+        lack = lack[hit]
         for k in range(3):
             np.maximum.at(lacks, corners[hit, k], lack)
         return lacks
 
-    def _lifted(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """The points, moved away from the eye's centre until the lids are clear of the eye.
+    def _lifted(self, points: Doubles, turn: Doubles | None, bare: Mask | None = None) -> Doubles:
+        """The points; those too near to the eye are moved away from the eye's centre.
 
-        Neighbours of such points are moved too, with a smooth fall-off.
+        Neighbours of the moved points move too, with a smooth fall-off.
 
         Args:
             points: float64[n, 3], the vertices of the lids in a pose.
             turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
+            bare: bool[columns], see _apart; None: no column.
         """
         arm = points - self.opening.frame.middle
         length = np.linalg.norm(arm, axis=1)
@@ -400,7 +413,7 @@ class Eyelids:
         need = np.where(rim, need, 0.0)
         lift = self._spread(need)
         for _ in range(_LIFTS):
-            lacks = self._lacks(points + lift[:, None] * ray, turn, 0.5 * _CLEAR * self.mm)
+            lacks = self._lacks(points + lift[:, None] * ray, turn, 0.5 * _CLEAR * self.mm, bare)
             if not lacks.any():
                 break
             need = lift + lacks

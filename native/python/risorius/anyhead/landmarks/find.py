@@ -4,17 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...author.geometry.skeleton import Doubles
 from ..form.fitting import FINE, Held, Pose, Target, fit, form_normals
 from ..form.heads import head_form
-from ..form.standing import NO_FACE, Standing, find_standing
+from ..form.standing import NO_FACE, SURE, Standing, find_standing
 from ..surface import Surface
 from ..telling import Progress, telling
 from .checks import LEAST, check_crossings, check_eyes, check_mesh, completed, lips_apart, pieces
+from .groups import Box, part_in
 from .marks import FOUND, LandmarkError, Landmarks
 from .refine import refined
 
@@ -36,6 +37,8 @@ class Hints:
         up, front: float64[3], the head's directions in the axes of the surface; None: unknown.
         eyes: float64[3] each, centres of eyeballs that are separate meshes.
         open_eyes: whether a head with closed or painted eyes is refused.
+        box: the head is likely in this box, see groups.head_box; None: unknown. Another place is
+            searched if there is no certain face in the box.
     """
 
     where: str = "the head"
@@ -44,6 +47,7 @@ class Hints:
     front: Doubles | None = None
     eyes: Sequence[Doubles] = ()
     open_eyes: bool = True
+    box: Box | None = None
 
 
 @dataclass(frozen=True)
@@ -140,6 +144,9 @@ def _looked_at(target: Surface, hints: Hints, tell: Progress) -> tuple[Target, P
         LandmarkError: no face was found, or faces were found in two pieces.
     """
     seen = Target(target)
+    named = _in_box(seen, hints, tell)
+    if named is not None:
+        return seen, named.pose, named.error
     best = _standing(seen, hints, tell)[0]
     parts = [p for p in pieces(target) if len(np.unique(p.triangles)) >= LEAST]
     parts = [p for p in parts if len(p.triangles) > _LARGE * len(parts[0].triangles)][:_TRIED]
@@ -157,12 +164,36 @@ def _looked_at(target: Surface, hints: Hints, tell: Progress) -> tuple[Target, P
     raise LandmarkError(f"{hints.where}: {_why_none(seen, hints, tell)}")
 
 
+def _in_box(seen: Target, hints: Hints, tell: Progress) -> Standing | None:
+    """The only face in the box of the hints; None if there is none that is certain, or several.
+
+    The model is fitted to the whole surface at last, so that a box that cuts the head does no harm.
+    """
+    part = part_in(seen.surface, hints.box)
+    if part is None or len(part.points) < LEAST:
+        return None
+    tell = _at_begin(tell)
+    best = _standing(Target(part), hints, tell)[0]
+    if best.error > SURE:
+        return None
+    others = [p for p in pieces(part)[:_TRIED] if _off(p, best.pose)]
+    if any(other.error <= SURE for _, other in _heads(others, hints, tell)):
+        return None
+    pose = fit(seen, best.pose, FINE[1:], _held(hints))
+    return replace(best, pose=pose)
+
+
 def _standing(seen: Target, hints: Hints, tell: Progress) -> list[Standing]:
     return find_standing(seen, hints.up, hints.front, _held(hints), tell)
 
 
 def _heads(parts: Sequence[Surface], hints: Hints, tell: Progress) -> list[tuple[Target, Standing]]:
     return [(seen, _standing(seen, hints, _at_end(tell))[0]) for seen in map(Target, parts)]
+
+
+def _at_begin(tell: Progress) -> Progress:
+    """Progress of work that may have to be repeated: it reports 0.0 always, and can be stopped."""
+    return lambda _share: tell(0.0)
 
 
 def _at_end(tell: Progress) -> Progress:

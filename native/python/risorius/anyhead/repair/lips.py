@@ -33,6 +33,7 @@ _BAND = 2.5  # mm from the rim along the skin: vertices up to here move with the
 # Fraction of the mouth's width: columns are not this close to a corner, where lips may be joined.
 _CORNER = 0.08
 _TOUCH = 0.8  # mm: lips touch in the rest pose if their gap is below half of it
+_SPACING = 0.7  # mm between samples: less than the width of a column
 _GOAL = 0.05  # mm: gap between closed lips
 _DEEP = 0.1  # mm that lips may press into each other, or their depth in the rest pose if larger
 _ROUNDS = 12
@@ -114,6 +115,9 @@ class Lips:
         self._edges = np.linspace(first + inset, last - inset, COLUMNS + 1)
         columns = (self._edges[1:] + self._edges[:-1]) / 2
         self._places = np.array([first, *columns, last])  # corrections are 0 at the corners
+        self._grids = [
+            _grid(self.skin.points, own, _SPACING * self.mm) for own in (self._upper, self._lower)
+        ]
 
     def _touching(self) -> Doubles | None:
         """float64[2, 3]: both ends of the line in which the lips touch in the rest pose; None if
@@ -143,15 +147,16 @@ class Lips:
             points: float64[V, 3], vertex positions of the posed target.
         """
         gap, way = np.full(COLUMNS, np.inf), np.zeros((COLUMNS, 3))
-        for sign, own, other in ((1, self._upper, self._lower), (-1, self._lower, self._upper)):
-            samples = _samples(points, own)
+        upper, lower = self._grids
+        for sign, (corners, shares), other in ((1, upper, self._lower), (-1, lower, self._upper)):
+            samples = np.einsum("nk,nkd->nd", shares, points[corners])
             apart, toward = self._apart(points, samples, other)
             column = self._column(samples)
             order = np.argsort(-apart)  # the nearest is written last
             order = order[(column[order] >= 0) & (apart[order] < gap[column[order]])]
             gap[column[order]], way[column[order]] = apart[order], sign * toward[order]
         known = np.flatnonzero(np.isfinite(gap))
-        if len(known):  # interpolate columns without samples of a coarse lip
+        if len(known):  # interpolate columns without samples, beside the ends of a lip
             every = np.arange(COLUMNS)
             nearest = known[np.abs(every[:, None] - known).argmin(axis=1)]
             gap, way = np.interp(every, known, gap[known]), way[nearest]
@@ -304,11 +309,27 @@ def _of(skin: Surface, vertices: Ints) -> Ints:
     return np.asarray(skin.triangles[own[skin.triangles].all(axis=1)], np.int64)
 
 
-def _samples(points: Doubles, triangles: Ints) -> Doubles:
-    """float64[n, 3]: sample points: corners, middles of sides and centres of the triangles."""
-    corners = points[triangles]
-    sides = (corners + np.roll(corners, 1, axis=1)) / 2
-    return np.concatenate([corners.reshape(-1, 3), sides.reshape(-1, 3), corners.mean(axis=1)])
+def _grid(points: Doubles, triangles: Ints, spacing: float) -> tuple[Ints, Doubles]:
+    """Sample points on triangles: int64[n, 3], the triangle of each sample, and float64[n, 3], its
+    barycentric coordinates.
+
+    Args:
+        points: float64[V, 3], vertex positions in the rest pose.
+        triangles: int64[T, 3].
+        spacing: largest distance of neighbouring samples of a triangle in the rest pose; it is
+            larger in triangles with sides longer than 16 times this distance.
+    """
+    sides = np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2)
+    parts = np.clip(np.ceil(sides.max(axis=1) / spacing), 2, 16).astype(np.int64)
+    corners, shares = [], []
+    for count in np.unique(parts):
+        own, steps = triangles[parts == count], np.arange(count + 1)
+        a, b = (grid.ravel() for grid in np.meshgrid(steps, steps))
+        inside = a + b <= count
+        rows = np.stack([a, b, count - a - b], axis=1)[inside] / count
+        corners.append(np.repeat(own, len(rows), axis=0))
+        shares.append(np.tile(rows, (len(own), 1)))
+    return np.concatenate(corners), np.concatenate(shares)
 
 
 def _along(skin: Surface, begin: Ints, farthest: float) -> Doubles:

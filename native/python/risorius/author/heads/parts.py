@@ -56,6 +56,9 @@ class HeadPart:
         material: the material, or None.
         source: name of the object to which the part belongs.
         polygons: indices of the part's polygons in the object; None: all.
+        groups: name of a vertex group, a joint or a group of polygons -> float64[n, 3], positions
+            of the vertices that belong to it (for a joint: with a weight above 0.5), in the space
+            of the parts. Groups of a mesh that is divided are in one of its parts.
     """
 
     name: str
@@ -64,6 +67,7 @@ class HeadPart:
     material: Material | None = None
     source: str = ""
     polygons: Ints | None = None
+    groups: dict[str, Doubles] = field(default_factory=dict)
 
     @property
     def center(self) -> Doubles:

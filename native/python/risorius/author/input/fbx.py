@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from ...base import signatures
 from ...base.budget import Budget
+from ...base.errors import RisoriusError
 from ...importing.fbx import Node, Parser, Scene, is_fbx, object_name, properties, read_scene
 from ...importing.source import read_bytes
 from ..geometry.skeleton import Doubles, Ints
@@ -107,6 +108,33 @@ def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
     found = ObjMesh(points @ turn[:3, :3].T + turn[:3, 3], uvs, faces, uv_faces)
     found, moved = welded(found, list(shapes.values()))
     return found, dict(zip(shapes, moved, strict=True))
+
+
+def groups_of(scene: Scene, number: int) -> dict[str, Doubles]:
+    """The vertices of a mesh by joint: name -> float64[n, 3], positions of the vertices with a
+    weight above 0.5, in the space of mesh_of(). Damaged weights are left out, because only hints
+    are made of the groups.
+
+    Args:
+        scene: the open file.
+        number: object number of the mesh, from meshes_of().
+    """
+    turn = _axes(scene) @ _to_world(scene, number)
+    points = _triples(scene, scene.objects[number], "Vertices") @ turn[:3, :3].T + turn[:3, 3]
+    out: dict[str, Doubles] = {}
+    for skin, _ in _below(scene, number, "Deformer", "Skin"):
+        for cluster, node in _below(scene, skin, "Deformer", "Cluster"):
+            joint = next((n for n in scene.children.get(cluster, []) if _is_model(scene, n)), 0)
+            try:
+                index, weights = node.array("Indexes"), node.array("Weights")
+            except RisoriusError:
+                continue
+            if joint and len(index) == len(weights):
+                own = index[weights > 0.5].astype(np.int64)
+                own = own[(own >= 0) & (own < len(points))]
+                if len(own):
+                    out[object_name(scene.objects[joint])] = points[own]
+    return out
 
 
 def _choose(scene: Scene, path: Path, wanted: str) -> int:

@@ -43,7 +43,9 @@ def read_fbx_head(path: Path) -> list[HeadPart]:
             again += 1
             source = f"{name}.{again}"
         part = HeadPart(source, *fbx.mesh_of(scene, number), source=source)
-        out.extend(_by_materials(scene, path, number, part, known))
+        own = _by_materials(scene, path, number, part, known)
+        own[0].groups = fbx.groups_of(scene, number)
+        out.extend(own)
     if not out:
         raise ShapeFileError(f"{path}: a mesh with blend shapes was expected, found none")
     return out

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ...base import signatures
 from ...base.budget import Budget
+from ...base.errors import RisoriusError
 from ...base.given import GivenError, shown
 from ...importing import named_json
 from ...importing.gltf import FLOATS, INDICES, Document, is_glb, is_gltf, open_glb, open_gltf
@@ -182,6 +183,49 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
     mesh = ObjMesh(points @ size.T + turn[:3, 3], uvs, faces, faces)
     mesh, moved = welded(mesh, deltas, all_polygons=False)
     return mesh, dict(zip(names, moved, strict=True))
+
+
+def groups_of(document: Document, number: int) -> dict[str, Doubles]:
+    """The vertices of a skinned mesh by joint: name -> float64[n, 3], positions of the vertices
+    with a weight above 0.5, in the space of assembled(). Empty without a skin, for weights that are
+    compressed by Draco, and for damaged weights, because only hints are made of the groups.
+
+    Args:
+        document: the open file.
+        number: index of the mesh.
+    """
+    world = _World(document)
+    node = world.of_mesh(number)
+    if node < 0 or "skin" not in world.rows[node]:
+        return {}
+    try:
+        joints = document.item("skins", world.rows[node]["skin"], "skin")["joints"]
+        names = [str(world.rows[joint].get("name") or "") for joint in joints]
+        turn, out = _node_matrix(document, number), dict[str, list[Doubles]]()
+        row = document.json["meshes"][number]
+        own = {repr(p.get("attributes")): p for p in primitives(document, row, number)}
+        for primitive in own.values():  # primitives may share vertices
+            for joint, points in _held(document, primitive, f"meshes[{number}]"):
+                out.setdefault(names[joint], []).append(points @ turn[:3, :3].T + turn[:3, 3])
+    except (RisoriusError, LookupError, TypeError):
+        return {}
+    return {name: np.concatenate(rows) for name, rows in out.items()}
+
+
+def _held(
+    document: Document, primitive: Mapping[str, Any], place: str
+) -> Iterator[tuple[int, Doubles]]:
+    """Yields for each joint of a primitive its index in the skin, and the positions of the vertices
+    with a weight above 0.5."""
+    given = primitive["attributes"]
+    points = _Packed(document, primitive, place).rows(given, "POSITION", "VEC3")
+    joints = document.rows(given["JOINTS_0"], place, "VEC4", INDICES).astype(np.int64)
+    weights = document.rows(given["WEIGHTS_0"], place, "VEC4")
+    most = weights.argmax(axis=1)
+    every = np.arange(len(points))
+    held = np.where(weights[every, most] > 0.5, joints[every, most], -1)
+    for joint in np.unique(held[held >= 0]):
+        yield int(joint), points[held == joint]
 
 
 class _Part:

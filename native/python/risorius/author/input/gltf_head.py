@@ -50,8 +50,10 @@ def read_gltf_head(path: Path) -> list[HeadPart]:
             raise document.fail(f"meshes[{number}]", f"a table was expected, found {shown(row)}")
         for name, turn in _places(document, number, row):
             source = _free(name, {part.source for part in out})
-            for part in _parts(document, number, source, materials):
-                out.append(_placed(part, turn))
+            own = _parts(document, number, source, materials)
+            if own:
+                own[0].groups = gltf.groups_of(document, number)
+            out.extend(_placed(part, turn) for part in own)
     if not out:
         raise ShapeFileError(f"{path}: a mesh with morph targets was expected, found none")
     return out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads the swinging chains of a VRM body, such as a skirt, for the nodes of the exported file."""
+"""Converts the swinging chains of a VRM body, such as a skirt's, to the exported file's nodes."""
 
 from __future__ import annotations
 
