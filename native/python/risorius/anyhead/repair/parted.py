@@ -119,12 +119,17 @@ def _near(lips: Lips, way: Doubles) -> float | None:
         return float(np.quantile(np.nan_to_num(lips.meeting(points).gap), _QUANTILE)) / lips.mm
 
     share, apart, change = 0.0, gap(0.0), _FIRST
+    deepest = min(apart, 0.0)
     for _ in range(_ROUNDS):
-        before, share = apart, share + change
-        apart = gap(share)
-        if not apart < before or share > _MOST:
+        then = gap(share + change)
+        if then < deepest:  # the change was too large
+            change /= 2
+            continue
+        if not then < apart or share + change > _MOST:
             return None
-        if apart < _NEAR:
+        share += change
+        if then < _NEAR:
             return share
-        change = min(_SHORTER * apart / (before - apart) * change, _CHANGE)
+        change = min(_SHORTER * then / (apart - then) * change, _CHANGE)
+        apart = then
     return None
