@@ -19,7 +19,7 @@ MODULE = "bl_ext.user_default.risorius"
 
 @pytest.fixture(scope="session")
 def installed():
-    """None if run.py installed a package; otherwise the folder with a copy of the add-on."""
+    """The folder with a copy of the add-on, or None if run.py has installed a packaged add-on."""
     if os.environ.get("RISORIUS_TEST_INSTALLED"):
         return None
     target = Path(os.environ["RISORIUS_TEST_USER"]) / "extensions" / "user_default" / "risorius"
@@ -31,10 +31,10 @@ def installed():
 
 @pytest.fixture(scope="session", autouse=True)
 def kept_wheels():
-    """Keep the files of wheels, which Blender deletes when an extension is disabled.
+    """Keep the unpacked wheels, which Blender would delete when a test disables the extension.
 
-    Unpacking them again takes longer than most tests; test_extension.py tests the deletion in other
-    processes.
+    Unpacking the wheels for each test would take longer than most tests. test_extension.py tests
+    the deletion in processes of its own.
     """
     import addon_utils
 
@@ -51,10 +51,10 @@ def kept_wheels():
 
 @pytest.fixture(autouse=True)
 def tracebacks():
-    """Exceptions that Blender printed from our handlers, timers and operators.
+    """Texts of the exceptions from handlers, timers and operators of the add-on.
 
-    A test with such an exception fails, because Blender only prints it and goes on. A test that
-    plants an exception removes it from this list.
+    Blender only prints such an exception and goes on, so this fixture lets the test fail. A test
+    that causes an exception on purpose removes its text from this list.
     """
     printed = []
 
@@ -87,14 +87,15 @@ def addon(installed, tracebacks):
 
 
 def _repository(installed):
-    """Set the folder of the extension repository, which factory settings remove."""
+    """Set the folder of the extension repository, because loading factory settings removes it."""
     import addon_utils
 
     repos = bpy.context.preferences.extensions.repos
     repository = next((r for r in repos if r.module == "user_default"), None)
     if repository is None:
         repository = repos.new(name="User Default", module="user_default")
-    # Set it even if it has this value, because Blender reads the folder when it is set.
+    # Set the folder even if the repository has it already, because Blender reads the folder only
+    # when this property is set.
     repository.use_custom_directory = True
     repository.custom_directory = str(installed.parent)
     addon_utils.extensions_refresh(ensure_wheels=False)
@@ -104,7 +105,8 @@ def _repository(installed):
 def mode(request):
     """The mode of the face: Direct mode, or posed bones with a shape key for each channel.
 
-    Some test files replace this fixture, most to add the mode with one live shape key.
+    Some test files have a fixture of the same name instead; most of them add the mode LIVE, with
+    one live shape key per mesh.
     """
     return request.param
 

@@ -5,8 +5,9 @@
     blender -b --factory-startup -noaudio --python-exit-code 1 \
         --python blender_tests/run.py -- [--extension ZIP] [pytest arguments]
 
-With --extension that package is installed as its users install it, wheel included; without, the
-add-on is copied from the tree and `risorius` must be importable.
+With --extension, the package ZIP is installed as users install it, with the wheel in it. Without
+--extension, the add-on is copied from the source folder, and Python must be able to import
+`risorius`.
 """
 
 import argparse
@@ -31,7 +32,7 @@ def _arguments() -> tuple[argparse.Namespace, list[str]]:
 
 
 def _install(package: Path) -> None:
-    """Install a package through Blender's own extension system."""
+    """Install the zip file of an extension through Blender's extension system."""
     import bpy  # noqa: F401  as a module it brings addon_utils onto the path
 
     sys.path.insert(0, str(HERE.parent / "packaging" / "check" / "blender"))
@@ -42,14 +43,14 @@ def _install(package: Path) -> None:
 
 
 def main() -> int:
-    """Run pytest on the named tests, else on this folder. Returns its exit code.
+    """Run pytest on the tests of the command line, or on this folder. Returns pytest's exit code.
 
-    Before that, makes a throw-away user folder if BLENDER_USER_RESOURCES is not set, and installs
-    the package of --extension.
+    Before that, main makes a temporary user folder if BLENDER_USER_RESOURCES is not set, and
+    installs the package of --extension.
     """
     made = None
     if "BLENDER_USER_RESOURCES" not in os.environ:
-        # Blender reads this variable when it starts, so it is set before bpy is imported.
+        # The bpy module reads this variable when it is imported, so it is set before.
         made = os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="risorius-blender-")
     os.environ["RISORIUS_TEST_USER"] = os.environ["BLENDER_USER_RESOURCES"]
     options, rest = _arguments()

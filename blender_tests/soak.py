@@ -4,10 +4,11 @@
     python blender_tests/soak.py [--actions 10000] [--seed N] [--characters 3] [--until K]
     python blender_tests/soak.py --blender /path/to/blender ...
 
-A parent process starts Blender (or the bpy module of this Python), kills it when it hangs, and
-names the action and the seed when it dies. Fails on an exception, also one that a handler only
-prints; on a face or a driver that is wrong; on memory or datablocks that grow with time.
-`--until K --check 1` replays a run up to an action and looks at every face after each.
+A parent process starts Blender (or the bpy module of this Python) as a child process. It kills
+the child if the child hangs, and reports the action and the seed if the child dies. The test fails
+on an exception, even if Blender only prints it; on a wrong face or driver; and on memory or
+data-blocks that grow with time. `--until K --check 1` repeats a run up to action K, and compares
+every face with the oracle after each action.
 The log is build/logs/soak-SEED.log, or the file that --log names.
 """
 
@@ -55,7 +56,7 @@ def arguments(given):
 
 
 def command(options, folder):
-    """The child's command line."""
+    """The command line of the child process, which does the actions."""
     rest = [
         "--child", str(folder), "--actions", str(options.actions), "--seed", str(options.seed),
         "--characters", str(options.characters), "--check", str(options.check),
@@ -95,7 +96,14 @@ def parent(options):
 
 
 def report(options, folder, ending, seconds):
-    """The text of the log, and whether the run failed."""
+    """The text of the log of a run, and whether the run failed.
+
+    Args:
+        options: options of the command line.
+        folder: folder in which the child left its result, journal and output.
+        ending: reason why the child was ended, or "".
+        seconds: duration of the run.
+    """
     result = {}
     if (folder / "result.json").is_file():
         result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
@@ -141,7 +149,7 @@ class Output:
             os.dup2(target, descriptor)
 
     def news(self):
-        """The output since the last call."""
+        """The text that was printed since the last call of this method."""
         sys.stdout.flush()
         sys.stderr.flush()
         ctypes.CDLL(None).fflush(None)
@@ -153,7 +161,7 @@ class Output:
 
 
 def memory():
-    """Resident memory in MiB, after releasing free memory."""
+    """Resident memory of this process in MiB, after unused memory was given back to the system."""
     gc.collect()
     libc = ctypes.CDLL(None)
     if hasattr(libc, "malloc_trim"):
@@ -163,7 +171,10 @@ def memory():
 
 
 def growth(values):
-    """Fitted growth over the second half of the samples, in their unit; 0 if it has less than 4."""
+    """Growth of samples over the second half of the run, by a fitted line, in the samples' unit.
+
+    The result is 0 if the second half has fewer than 4 samples.
+    """
     half = values[len(values) // 2 :]
     if len(half) < 4:
         return 0.0
@@ -221,7 +232,7 @@ class Run:
             self.fail(number, kind, printed[-3000:])
 
     def check(self, number, kind):
-        """Compare all faces with the oracle."""
+        """Compare all faces with the oracle after action `number`; differences become errors."""
         self.checks += 1
         try:
             self.worst = max(self.worst, self.world.check())
@@ -233,7 +244,7 @@ class Run:
         self.errors.append(f"action {number} ({kind}): {text}")
 
     def sample(self, number):
-        """Record the memory of a freshly loaded file, and datablocks that no character uses."""
+        """Reload the file, and record memory and data-blocks that no character uses."""
         self.world.random = random.Random(f"{self.options.seed} calm {number}")
         self.world.calm()
         counts = self.world.leftovers()
@@ -245,7 +256,7 @@ class Run:
         self.samples["all left"].append(sum(counts.values()))
 
     def judge(self):
-        """Texts about the growth of rows of 8 or more samples; too much growth becomes an error."""
+        """Texts about the growth of series of at least 8 samples; much growth becomes an error."""
         found = []
         for name, row in self.samples.items():
             if name == "at action" or len(row) < 8:
@@ -257,7 +268,7 @@ class Run:
         return found
 
     def result(self):
-        """The result for the parent process."""
+        """The result of the run, which is written to a JSON file for the parent process."""
         import bpy
 
         return {
@@ -268,7 +279,10 @@ class Run:
 
 
 def plant(world, number):
-    """At the fifth action cause the fault that RISORIUS_SOAK_PLANT names, to test the soak."""
+    """Cause a fault at the fifth action, to check that the soak test notices it.
+
+    The environment variable RISORIUS_SOAK_PLANT names the fault; without it nothing happens.
+    """
     kind = os.environ.get("RISORIUS_SOAK_PLANT") if number == 5 else None
     if kind == "face":
         block = world.rigs()[0]["risorius_mesh_000"].data.shape_keys.reference_key
@@ -282,7 +296,7 @@ def plant(world, number):
 
 
 def child(options):
-    """Do the actions in this Blender, up to the fifth error, and write the result to a file."""
+    """Do the actions in this process until the fifth error, and write the result to a file."""
     folder = options.child
     for place in os.environ.get("RISORIUS_TEST_PATH", "").split(os.pathsep):
         if place:

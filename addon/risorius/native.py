@@ -200,7 +200,10 @@ def regions() -> FaceRegions:
 
 
 class LiveSource(TypedDict):
-    """A program that sends captured faces; a table of live/sources.toml in the wheel."""
+    """A program that sends captured faces, as a table of the file live/sources.toml describes it.
+
+    The file is a part of the `risorius` wheel.
+    """
 
     port: int  # UDP port
     title: str

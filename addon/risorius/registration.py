@@ -83,7 +83,8 @@ CLASSES = (
 )
 
 
-# These caches are kept until Blender quits, because the extension's files do not change.
+# The caches of these functions are kept until Blender quits, because the files of the extension,
+# from which the functions read, do not change.
 session.adopt(
     ("quit",),
     native.addon_version,

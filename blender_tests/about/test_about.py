@@ -165,8 +165,8 @@ def test_the_overlay_tells_the_stages_of_the_last_frames(dna_file):
     lines = timing.lines()
     assert lines[0].startswith("Risorius, faces: 2")
     assert [line.split()[0] for line in lines[2:6]] == ["controls", "rig", "bones", "shapes"]
-    # The times are read from `frames`, because lines are rounded to 0.01 ms, and a small face
-    # may take less.
+    # The times are read from `timing.frames`, because the lines are rounded to 0.01 ms, and a
+    # stage of a small face may take less than 0.005 ms.
     played = [frame for frame in timing.frames if frame.characters]
     assert len(played) == 6
     assert all(frame.stages[stage] > 0 for frame in played for stage in timing.STAGES)

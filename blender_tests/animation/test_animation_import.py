@@ -30,7 +30,10 @@ def rig(dna_file):
 
 
 def _clip(**changes):
-    """A clip of half a second at 60 fps from 2 s on: moving jaw, still brow, unknown curve."""
+    """A clip from 2 s to 2.5 s at 60 fps: a moving jaw, a constant brow, an unknown curve.
+
+    `changes` replaces `rate` and `start`.
+    """
     count = 31
     jaw = 0.5 - 0.5 * np.cos(np.arange(count) / 5)
     curves = [jaw, np.full(count, 0.25), np.linspace(0, 1, count)]
@@ -135,7 +138,7 @@ def test_a_clip_for_another_thing_is_refused(rig):
 
 
 def test_a_minute_of_a_whole_face_has_all_its_keys(tmp_path):
-    """Eight controls with random values in all of 3600 frames at 60 fps."""
+    """A clip with random values of eight controls at 3600 frames gives 3600 keys for each."""
     from support.faces import CONTROLS, small_face
 
     random = np.random.default_rng(3)
@@ -205,7 +208,8 @@ def test_the_head_turns_as_the_clip_says(rig, rotation_mode):
     _played(rig, 12)
     seen = controls.evaluated_get(bpy.context.evaluated_depsgraph_get())
     turn = place.own_turn(seen, seen.pose.bones["head"])
-    # An independent formula: roll about y, then pitch about x, then yaw about z (Blender's axes).
+    # The expected rotation at frame 12 by an independent formula: roll about y, then pitch about x,
+    # then yaw about z, in Blender's axes.
     wanted = Euler((-0.2, -0.25, 0.45), "YXZ").to_quaternion()
     assert turn.rotation_difference(wanted).angle < 1e-3  # in the bone's interpolation
     nose, crown = turn @ Vector((0, -1, 0)), turn @ Vector((0, 0, 1))
@@ -247,9 +251,9 @@ EXPECTED = (JAW, PULL, BROW, "CTRL_expressions.eyeLookUpL")
 
 @pytest.fixture
 def capture(tmp_path):
-    """A CSV file in the format of Live Link Face, with one lost row.
+    """A CSV file in the format of Live Link Face, in which row 3 of rows 0 to 39 is missing.
 
-    It has 30 rows per second; its timecodes count 60 frames per second.
+    The file has 30 rows per second, but its timecodes count 60 frames per second.
     """
     names = ["JawOpen", "MouthSmileLeft", "BrowDownLeft", "EyeLookUpLeft", "TongueOut", "HeadYaw"]
     lines = [",".join(["Timecode", "BlendShapeCount", *names, "Surprise"])]
@@ -298,8 +302,8 @@ def test_a_capture_lands_on_whole_frames_of_the_scene(rig, capture, fps, fps_bas
         assert np.array_equal(frames, np.rint(frames))
         assert (np.diff(frames) > 0).all()
         assert len(frames) <= 2 * 39
-    # At whole frames the jaw's F-curve equals straight lines between the rows of the CSV file.
-    # Before the first row and after the last row it is constant.
+    # At whole frames the jaw's F-curve has the values of straight lines between the rows of the
+    # CSV file. The F-curve is constant before the first row and after the last row.
     rows = np.array([0, 1, 2, 4, *range(5, 40)])
     jaw = next(c for c in curves if "jawOpen" in c.data_path)
     for frame in range(-1, int(40 / 30 * fps) + 3):
@@ -335,7 +339,8 @@ def test_a_long_pause_makes_no_keys(rig, tmp_path):
 def test_the_scenes_range_is_extended_fitted_or_kept(rig, capture, choice, before, after):
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = before
     bpy.context.scene.render.fps = 24
-    # The take lasts 39/30 s, which are 31.2 frames at 24 fps; it begins at frame 18.9.
+    # The capture lasts 39/30 s, which are 31.2 frames at 24 fps. It begins at frame 18.9 and ends
+    # at frame 50.1, so the range that contains it is 18 to 51.
     done = bpy.ops.risorius.import_animation(filepath=str(capture), start=18.9, **choice)
     assert done == {"FINISHED"}
     assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == after
@@ -384,7 +389,7 @@ def test_what_cannot_be_is_said_in_a_sentence(rig, capture, options, words):
 
 
 def _last_jaw(rig):
-    """Frame and value of the jaw's last key, with a tolerance of 0.001 for comparisons."""
+    """Frame and value of the jaw's last key, as a pair that equals others within 0.001."""
     action = scene.controls(rig).animation_data.action
     key = next(c for c in _curves(action) if "jawOpen" in c.data_path).keyframe_points[-1]
     return pytest.approx((key.co[0], key.co[1]), abs=1e-3)
@@ -480,7 +485,10 @@ def test_a_capture_as_a_strip_or_a_layer(rig, capture, target):
 
 
 def _arkit_rig():
-    """A triangle as from another tool: keyed shape keys with ARKit's names, and `hat` unkeyed."""
+    """A triangle that stands for a rig of another tool.
+
+    Its shape keys with ARKit's names have keyframes; its shape key `hat` has none.
+    """
     mesh = bpy.data.meshes.new("Other")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     item = bpy.data.objects.new("Other", mesh)
@@ -528,7 +536,7 @@ WORDS = "Hello, my name is Bob."
 
 @pytest.fixture
 def voice(tmp_path):
-    """A WAV file with a spoken sentence."""
+    """A WAV file in which espeak-ng speaks the sentence WORDS."""
     program = shutil.which("espeak-ng")
     if program is None or importlib.util.find_spec("pocketsphinx") is None:
         pytest.skip("EXTRA NOT RUN: speech needs the program espeak-ng and PocketSphinx")
@@ -598,7 +606,8 @@ def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_
     ended.run()
     assert type(ended.error).__name__ == "CancelledError"
     assert ended.result is None
-    # This pipe never delivers data, but the process that reads it must end.
+    # This pipe never delivers data. The process that reads it must still end when the task is
+    # cancelled.
     os.mkfifo(tmp_path / "endless.wav")
     stuck = listening.SpeechTask(str(tmp_path / "endless.wav"), WORDS)
     stuck.start()
@@ -609,9 +618,9 @@ def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_
 
 
 def test_speech_needs_nothing_of_what_this_blender_has_loaded(rig, voice, monkeypatch):
-    """If this Blender cannot load the recogniser, speech still works in a separate process.
+    """If Blender's process cannot load the recogniser, a separate process still recognises speech.
 
-    The reason may be another libpocketsphinx in Blender.
+    A possible reason is that Blender's process has loaded another libpocketsphinx.
     """
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     monkeypatch.setattr(
@@ -673,7 +682,7 @@ def test_the_preferences_say_in_words_why_the_button_is_grey(monkeypatch):
 
 @pytest.fixture
 def shelf(tmp_path, monkeypatch):
-    """A folder from which pip installs packages instead of the network."""
+    """A folder from which pip installs packages during the test, instead of from the network."""
     folder = tmp_path / "shelf"
     folder.mkdir()
     for name in [name for name in os.environ if name.startswith("PIP_")]:
@@ -687,7 +696,10 @@ def shelf(tmp_path, monkeypatch):
 
 
 def put_wheel(shelf):
-    """Put a package with the name of PocketSphinx on the shelf. Returns its SHA-256."""
+    """Put an empty package with the name of PocketSphinx into the folder `shelf`.
+
+    Returns the SHA-256 of the package's file.
+    """
     info = "pocketsphinx-5.1.1.dist-info"
     path = shelf / "pocketsphinx-5.1.1-py3-none-any.whl"
     with zipfile.ZipFile(path, "w") as wheel:

@@ -24,7 +24,14 @@ def _layers():
 
 
 def _action(rig, name="Wave", interpolation="BEZIER", **curves):
-    """Make an action from control -> {frame: value}."""
+    """Make an action with keys on sliders.
+
+    Args:
+        rig: the face.
+        name: name of the action.
+        interpolation: interpolation of all keys.
+        curves: short name of a slider -> {frame: value}.
+    """
     controls, bone = scene.controls(rig), scene.face(rig)
     data = controls.animation_data_create()
     before = data.action
@@ -66,7 +73,7 @@ def _value(rig, frame, name):
 
 
 def _strip(rig, action, track="Track", **settings):
-    """A strip of Blender's NLA with an action on a new track."""
+    """Add an NLA strip that plays an action on a new track, with `settings` of the strip."""
     data = scene.controls(rig).animation_data_create()
     new = data.nla_tracks.new()
     strip = new.strips.new(track, 1, action)
@@ -157,9 +164,10 @@ def _entry(rig, **settings):
 
 
 def _performance(rig, rules):
-    """Add layers: a wave of three sliders, an expression of the mouth, a blink, fired reactions.
+    """Add layers: a wave of three sliders, an expression, a repeated blink, and fired reactions.
 
-    The expression fades in and out. `rules` says whether the rules between layers are on.
+    The expression moves only the mouth, and fades in and out. `rules` is the setting
+    `risorius_layer_rules` of the face.
     """
     controls = scene.controls(rig)
     controls.risorius_layer_rules = rules
@@ -174,7 +182,7 @@ def _performance(rig, rules):
 
 
 def _mixer(rig, rules):
-    """The layers of `_performance` with the same `rules` as a risorius.Mixer, times in seconds."""
+    """A risorius.Mixer with the same layers and rules as `_performance`, with times in seconds."""
     import risorius
 
     names = scene.submodule("scene.character.runtime").of(rig).labels
@@ -272,7 +280,7 @@ def test_a_render_shows_what_the_viewport_shows(blinker, tmp_path):
 
 
 def _names(controls):
-    """The names of the layers, the lowest first."""
+    """The names of a face's layers, the lowest layer first."""
     return [layer.name for layer in _layers().of(controls)]
 
 
@@ -309,7 +317,13 @@ def test_keys_of_a_weight_go_with_their_layer(rig):
 
 
 def _key_weights(controls, name, *values):
-    """An action that no object uses, with a keyframe for the weight of each layer."""
+    """An action that no object uses, with keyframes at frame 1 for weights of layers.
+
+    Args:
+        controls: control armature of the face.
+        name: name of the action.
+        values: weights of the first layers, from the lowest layer on.
+    """
     data = controls.animation_data_create()
     data.action = action = bpy.data.actions.new(name)
     for place, value in enumerate(values):
@@ -336,7 +350,7 @@ def _as_meta_strip(controls, action):
 
 
 def _as_linked(controls, action, folder):
-    """Link the action from another .blend and assign it."""
+    """Move the action to another .blend file, link it from there and assign it to the controls."""
     path = folder / "actions.blend"
     name = action.name
     bpy.data.libraries.write(str(path), {action})
@@ -660,9 +674,10 @@ def test_expressions_become_pose_assets_in_catalogues(rig, tmp_path):
 
 
 def test_the_catalogues_are_whole_for_whoever_reads_them(rig, tmp_path):
-    """A catalogue file is replaced, not rewritten, so that other readers never see half of it.
+    """Blender's file of asset catalogues is replaced, not rewritten, when catalogues are added.
 
-    The file keeps its old catalogues. If it is a symbolic link, it remains one.
+    So a program that reads the file never sees half of it. The new file contains the old
+    catalogues too, and a symbolic link to the file remains a link.
     """
     shared, link = tmp_path / "shared.txt", tmp_path / "blender_assets.cats.txt"
     old = "VERSION 1\n\n6f0a5c9e-2f0b-4d2e-9a3b-0d9f6f0b7a12:Props:Props\n"

@@ -17,7 +17,7 @@ def rig(dna_file):
 
 
 def wanted(path, frame):
-    """Vertices of the head in Blender's space at a frame; two controls rise together."""
+    """The head's vertices in Blender's space at a frame; the controls of MOVED rise from 0."""
     dna = risorius.load(str(path))
     raw = np.zeros(len(dna.raw_control_names), np.float32)
     for name, most in MOVED.items():
@@ -34,7 +34,12 @@ def add_mesh(points, name="Take"):
 
 
 def performer(path, change=lambda points: points):
-    """An object whose shape keys repeat the motion of `wanted`, with one key per frame."""
+    """An object that shows the vertices of `wanted` at each frame by a shape key for each frame.
+
+    Args:
+        path: path of the DNA file.
+        change: function that changes the vertices of each frame, such as a rotation.
+    """
     rest = change(wanted(path, 1))
     item = add_mesh(rest)
     item.shape_key_add(name="Basis")

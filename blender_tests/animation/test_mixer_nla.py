@@ -18,7 +18,7 @@ def clip(names=NAMES, seed=1, high=0.5):
 
 
 def new_curve(action, path, index=0):
-    """A new F-curve of an action; actions have slots from Blender 4.4 on."""
+    """Make an F-curve of an action, also in Blender 4.4 and later, in which actions have slots."""
     if not hasattr(action, "slots"):
         return action.fcurves.new(path, index=index)
     if not action.slots:
@@ -40,7 +40,7 @@ def keys(curve, frames, values):
 
 
 def action_of(source):
-    """The clip as an action; both begin with frame 0."""
+    """Make an action with the curves of a clip; sample 0 of the clip is at frame 0."""
     action = bpy.data.actions.new("Clip")
     for name, values in zip(source.names, source.curves, strict=True):
         keys(new_curve(action, f'["{name}"]'), np.arange(FRAMES), values)
@@ -48,7 +48,14 @@ def action_of(source):
 
 
 def strip_of(face, source, settings):
-    """Add a strip on a new top track; the settings have Blender's names."""
+    """Add an NLA strip with a clip on a new top track.
+
+    Args:
+        face: the object.
+        source: the clip.
+        settings: properties of the strip by Blender's names; besides, "influence_curve" and
+            "time_curve" are (frames, values) of keys, and "ends" is (start, end) of the strip.
+    """
     settings = dict(settings)
     track = face.animation_data.nla_tracks.new()
     action = action_of(source)
@@ -91,8 +98,8 @@ def new_face():
     return face
 
 
-# Name -> (seed of the clip, settings of Blender's strip, settings of our layer) of each layer, the
-# lowest first.
+# Name of a test case -> its layers, the lowest first. A layer is (seed of the random clip, settings
+# of Blender's strip, settings of risorius.Layer).
 STACKS = {
     "replace": [(1, {}, {})],
     "add": [
@@ -208,7 +215,8 @@ STACKS = {
         ),
     ],
 }
-# Seed of a clip -> channels that the strip's action lacks. The mask of our layer excludes them too.
+# Seed of a clip -> channels that the action of the NLA strip lacks. The mask of the risorius.Layer
+# excludes these channels, too.
 LACKS = {2: ("b",), 3: ("a", "d")}
 
 

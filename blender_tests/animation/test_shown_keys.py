@@ -20,7 +20,7 @@ def _selecting(bone):
 
 
 def _select(rig, *names):
-    """Select these bones of the controls and deselect all others."""
+    """Select the named bones of the control armature, and deselect its other bones."""
     for bone in scene.controls(rig).pose.bones:
         _selecting(bone).select = bone.name in names
 
@@ -42,10 +42,11 @@ def _other_armature():
 
 
 def test_a_key_is_seen_whatever_was_selected_before(rig):
-    """Key All makes its keys visible, also if another bone, the head, a body or nothing is chosen.
+    """The operator Key All makes its keys visible in editors that show only selected items.
 
-    Outside pose mode keys of head and eyes are visible too, so that moving a column of keys moves
-    all of them.
+    This holds if another bone, the head mesh, a body's armature or nothing was selected. Outside
+    pose mode the keys of head and eyes become visible too, so that the user can move all keys of a
+    frame together.
     """
     controls, head, body = scene.controls(rig), scene.meshes(rig)[0], _other_armature()
     bpy.ops.risorius.key()

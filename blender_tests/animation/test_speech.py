@@ -17,7 +17,7 @@ LENGTH = 0.1  # seconds per sound
 
 
 def heard():
-    """A voice of 1.3 s: three words, with silence before, between and after them."""
+    """A recognised voice of 1.3 s: three words, with silence before and after each word."""
     phones = []
     for i, said in enumerate(SAID):
         name, _, word = said.partition(".")
@@ -29,7 +29,7 @@ def heard():
 
 @pytest.fixture
 def rig(dna_file, monkeypatch):
-    """A face in a scene with 24 frames per second, and a recogniser with a fixed result."""
+    """A face in a scene with 24 frames per second; the recogniser always returns `heard()`."""
 
     class Task:
         error = None
@@ -82,7 +82,7 @@ def test_a_voice_has_as_few_keys_as_its_curves_need(rig):
 
 
 def test_a_layer_shows_the_voice_at_every_frame(rig):
-    """A layer reads an F-curve with Bezier handles, within the tolerance of the fitted keys."""
+    """A layer plays the F-curves of a voice, within the tolerance of their fitted Bezier keys."""
     wanted = speech.animate(heard(), rate=24.0).curve(JAW)
     bpy.ops.risorius.speak(filepath="bob.wav", target="LAYER", start=11.0, use_sound=False)
     (layer,) = scene.controls(rig).risorius_layers
@@ -96,7 +96,7 @@ def test_a_layer_shows_the_voice_at_every_frame(rig):
 
 
 def test_a_face_speaks_by_its_own_visemes(rig, tmp_path):
-    """A face uses the visemes in the folder of its DNA file.
+    """A face uses its own visemes from the folder beside its DNA file, such as anna_expressions.
 
     A viseme with a control that the face lacks is ignored.
     """
@@ -118,7 +118,7 @@ def test_a_face_speaks_by_its_own_visemes(rig, tmp_path):
     assert wanted.max() > 0.3
     frames = 11 + np.arange(len(wanted))
     np.testing.assert_allclose([curve.evaluate(f) for f in frames], wanted, atol=0.006)
-    # Corrections use the same visemes, even if the folder is gone.
+    # A correction of a sound uses the same visemes, even if their file has been deleted.
     (folder / "aa.toml").unlink()
     before = max(k.co.y for k in curve.keyframe_points)
     for sound in action.risorius_spoken.sounds:
@@ -132,12 +132,12 @@ def test_a_face_speaks_by_its_own_visemes(rig, tmp_path):
 
 
 def sounds(action):
-    """Frame, phoneme and word of each sound."""
+    """Start frame, phoneme and word of each sound of the voice in an action."""
     return [(round(s.begin, 2), s.name, s.word) for s in action.risorius_spoken.sounds]
 
 
 def keys(action):
-    """All properties of the keys of each curve."""
+    """F-curve of an action -> place, handles and types of its keys, for comparisons."""
     found = {}
     for path, curve in curves(action).items():
         rows = [
@@ -153,7 +153,7 @@ def frame_of(place):
 
 
 def jaw_of(action):
-    """The jaw curve of a newly made voice with the same sounds as the action."""
+    """The values of the jaw at each frame of a new voice that is made from the action's sounds."""
     said = [*action.risorius_spoken.sounds]
     ends = [sound.begin for sound in said[1:]] + [frame_of(len(SAID))]
     phones = [
@@ -319,7 +319,7 @@ def test_a_correction_is_undone_in_one_step_with_its_keys(rig):
 
 
 def marker(frame):
-    """The only marker at this frame."""
+    """The marker at this frame of the scene; fails unless there is exactly one."""
     (found,) = [m for m in bpy.context.scene.timeline_markers if m.frame == frame]
     return found
 

@@ -57,7 +57,7 @@ def test_a_file_of_which_nothing_is_known_can_be_named_too(rig, tmp_path):
     assert bpy.ops.risorius.save_curve_mapping(filepath=str(mine)) == {"FINISHED"}
     scene.evaluated(scene.meshes(rig)[0])
     assert scene.face(rig)[PULL] == 1.0
-    # The saved mapping is extended by the second curve.
+    # Saving again adds the assignment of the second curve to the existing mapping file.
     bpy.ops.risorius.assign_curve(curve="Key 1", becomes="jawOpen")
     bpy.ops.risorius.save_curve_mapping(filepath=str(mine))
     assert set(importing.load_mapping(mine).rows) == {"Key 1", "Key 2"}

@@ -23,7 +23,7 @@ def head(package):
 
 
 def shown(head):
-    """The shown landmarks of a head: name -> Point."""
+    """The landmarks that the scene contains for a head: name -> Point."""
     return scene.submodule("scene.anyhead.points").of(head)
 
 
@@ -39,7 +39,8 @@ def test_they_stand_on_a_head_that_is_turned_and_scaled(head, package):
     head.location, head.rotation_euler = (1.0, 2.0, 0.5), Euler((0.2, 0.1, 0.9))
     head.scale = (1.5, 1.5, 1.5)
     bpy.context.view_layer.update()
-    # The package gets the mesh y up and with the scale of the object applied.
+    # The add-on passes the mesh to the package with y up, in centimetres, and with the rotation and
+    # scale of the object applied.
     axes = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]) * 100.0
     turn = axes @ np.array(head.matrix_world.to_3x3())
     package.places = {name: turn @ to_blender(place) for name, place in PLACES.items()}

@@ -24,7 +24,7 @@ def _face(dna_file, mode="AUTO", **options):
 
 
 def _shown(rig, frame, whole=True):
-    """Visible vertices and animated maps at a frame."""
+    """Vertices of the visible meshes, and values of the animated maps, at a frame."""
     bpy.context.scene.frame_set(int(frame), subframe=frame - int(frame))
     shown = [m for _, m in sorted(scene.meshes(rig).items()) if not m.hide_viewport]
     return np.concatenate([scene.evaluated(m) for m in shown]), list(rig["maps"])
@@ -51,7 +51,7 @@ def _bake(rig=None, **options):
 def _state(rig):
     """Actions, NLA tracks, drivers and shape keys of a character, and which meshes are hidden.
 
-    All are plain values for comparisons. Keyframes and strips are not contained, only the number of
+    The result contains plain values for comparisons: no keyframes and no strips, only the number of
     strips of each track.
     """
     owners = [rig, scene.controls(rig)]
@@ -139,9 +139,9 @@ def test_back_to_live_is_exact_also_after_save_and_load(mode, dna_file, tmp_path
 
 
 def _complicate(rig):
-    """Add a strip, a driver, a constraint, and animation of a bone and a shape key of the user.
+    """Add data of a user: an NLA strip, a driver, a constraint, and an animated bone and shape key.
 
-    Keys of the control armature's location are added to the strip.
+    An action with keys of the control armature's location is blended onto the strip by addition.
     """
     controls = scene.controls(rig)
     data = controls.animation_data
@@ -372,7 +372,7 @@ def test_a_strip_put_beside_the_baked_one_stays(dna_file):
     controls = animate(scene.load(dna_file))
     data, action = controls.animation_data, controls.animation_data.action
     _bake(kind="CONTROLS", strip=True)
-    # Blender 4.3 names the strip after its action, whatever name is given.
+    # Blender 4.3 gives the strip the name of its action instead of the given name.
     mine = data.nla_tracks[-1].strips.new("mine", 100, action).name
     assert bpy.ops.risorius.unbake() == {"FINISHED"}
     assert [[s.name for s in t.strips] for t in data.nla_tracks] == [[mine]]
@@ -450,7 +450,7 @@ def test_between_baked_frames_lie_straight_lines(dna_file):
 
 
 class _Window:
-    """A simulated window for a modal operator."""
+    """Stands for window, context and operator, so that a modal bake runs without a window."""
 
     def __init__(self, job):
         self.window_manager, self.scene = self, bpy.context.scene

@@ -25,9 +25,9 @@ def mode(request):
 
 
 def _has_maps_of_the_frame(rig, item):
-    """Check that the material of a simulated mesh reads the first animated map of the frame.
+    """Check that a mesh's material has the value of the first animated map at frames 1 and 4.
 
-    The values at frames 1 and 4 must also differ.
+    The values at these two frames must also differ.
     """
     assert "maps" in item
     material, seen = item.data.materials[0], []
@@ -51,7 +51,10 @@ def test_pinned_cloth_is_the_face_of_its_frame(mode, dna_file):
 
 
 def test_a_cache_that_begins_below_0_is_refused(dna_file):
-    """At negative frames Blender reads the last frame of the cache whenever a face moves."""
+    """A physics cache that begins below frame 0 is refused.
+
+    At negative frames Blender would show the last frame of the cache whenever a face moves.
+    """
     _rig, item = simulations.moving(dna_file, "LIVE")
     modifier = simulations.cloth(item)
     modifier.point_cache.frame_start = -3
@@ -82,7 +85,7 @@ def test_a_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_fil
 
 
 def test_a_baked_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_file, tmp_path):
-    """Blender computes geometry nodes after its handlers, so they are never a frame late."""
+    """Blender computes geometry nodes after the frame handlers, so they see the face in time."""
     _rig, item = simulations.moving(dna_file, mode, far=0.0)
     shown = simulations.film(item)
     wanted = simulations.mean_places(shown)
@@ -202,7 +205,7 @@ WAYS = (_as_it_is, _by_nla, _by_driver, _by_constraint, _by_body, _by_layer, _by
 
 @pytest.mark.parametrize("way", WAYS)
 def test_the_pose_is_there_when_the_frame_is_evaluated(way, dna_file):
-    """The first handler after the evaluation sees the final face."""
+    """The first handler that Blender calls after evaluating a frame sees the final vertices."""
     rig, item = simulations.moving(dna_file, "AUTO")
     way(rig)
     seen = []
@@ -284,7 +287,7 @@ def test_nothing_of_it_is_seen(dna_file, tmp_path, capfd):
 
 @pytest.fixture
 def onlooker():
-    """Another add-on with a frame handler, for which faces must be posed."""
+    """Stands for another add-on with a frame handler, which needs posed faces."""
 
     def look(*_arguments):
         pass

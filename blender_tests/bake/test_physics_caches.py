@@ -13,7 +13,7 @@ VERSION = "risorius_version"
 
 
 def _baked(dna_file, mode):
-    """A face with pinned and baked cloth, and its head mesh."""
+    """A face whose head mesh has a baked cloth simulation with pinned vertices: (rig, mesh)."""
     rig, item = simulations.moving(dna_file, mode)
     simulations.cloth(item)
     assert bpy.ops.risorius.bake_physics() == {"FINISHED"}
@@ -77,7 +77,10 @@ def test_each_frame_in_a_process_of_its_own(dna_file, tmp_path):
 
 
 def test_a_render_with_motion_blur_has_the_face_of_every_part_of_a_frame(mode, dna_file, tmp_path):
-    """Tested with cloth, which Blender interpolates between the places at two whole frames."""
+    """With motion blur, a render sees the face at each time within a frame.
+
+    The face has cloth, whose places Blender interpolates between two whole frames.
+    """
     _face, item = _baked(dna_file, mode)
     setup, seen = bpy.context.scene, {}
     setup.render.engine, setup.cycles.samples, setup.cycles.device = "CYCLES", 1, "CPU"

@@ -39,7 +39,7 @@ def _frame():
 
 @pytest.fixture
 def probes():
-    """Event -> an empty list, which is a session entry that this event empties."""
+    """Name of an event -> a list in the session that this event must empty."""
     session = _session()
     kept = {word: session.keep(f"probe.{word}", list, (word,)) for word in WORDS}
     yield kept
@@ -84,7 +84,7 @@ def _fill(dna_file):
     return rig
 
 
-# Some of the session's entries that must be emptied when a file is loaded.
+# Entries of the add-on's session that must be emptied when a .blend file is loaded.
 MISSED = (
     "caches.late",
     "controls_ahead.edited",
@@ -121,7 +121,7 @@ def test_a_load_leaves_nothing_of_the_file_before(dna_file):
 
 
 def _timers():
-    """Names of the add-on's functions that Blender's timers will call."""
+    """Names of the add-on's functions that are registered as timers of Blender."""
     modules = [m for name, m in sys.modules.items() if name.startswith(f"{MODULE}.")]
     functions = {f for m in modules for f in vars(m).values() if inspect.isfunction(f)}
     return {f.__name__ for f in functions if bpy.app.timers.is_registered(f)}
@@ -144,14 +144,18 @@ def test_registered_again_it_is_as_new(dna_file):
 
 
 class _Holder:
-    """Holds one value, `it`."""
+    """An object whose attribute `it` is the only Python reference to a value."""
 
     def __init__(self, it):
         self.it = it
 
 
 def test_blender_counts_one_reference_too_few_to_temporary_data():
-    """In the first Blender that counts correctly this fails; then update MISCOUNTED_UNTIL."""
+    """Blender holds one reference too few to temporary data, up to version MISCOUNTED_UNTIL.
+
+    The test fails in the first version that counts correctly. Then set MISCOUNTED_UNTIL in
+    scene/base/stage.py to the version before.
+    """
     place = scene.submodule("scene.base.stage")
     lender = bpy.data.temp_data()
     lent, control = _Holder(lender.__enter__()), _Holder(object())

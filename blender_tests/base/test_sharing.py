@@ -28,7 +28,7 @@ def _picture(path, seed):
 
 @pytest.fixture
 def textured(tmp_path):
-    """A DNA file with data and images that are hard to compress."""
+    """A DNA file with metadata and images that are random, and so cannot be compressed."""
     face = small_face()
     noise = np.random.default_rng(3).integers(32, 127, METADATA, np.uint8)
     face.metadata = {
@@ -47,13 +47,13 @@ def textured(tmp_path):
 
 
 def _images(rig):
-    """Label of a node -> its image, in the head's material."""
+    """Label of an image texture node in the head's material -> the node's image."""
     nodes = scene.meshes(rig)[0].data.materials[0].node_tree.nodes
     return {n.label: n.image for n in nodes if n.type == "TEX_IMAGE"}
 
 
 def _pixels(rig, label="Colour"):
-    """The pixels of the image in a node, float32[n]."""
+    """The pixels of the image of the node with this label, RGBA in a row, float32[n]."""
     image = _images(rig)[label]
     flat = np.empty(image.size[0] * image.size[1] * 4, np.float32)
     image.pixels.foreach_get(flat)
@@ -100,7 +100,8 @@ def test_equal_faces_are_stored_once(textured, mode, tmp_path):
     _held_once(rigs)
     for rig in rigs:
         assert _exported(rig, tmp_path) == textured.read_bytes()
-    # Without sharing, each face would have its own file and images.
+    # Three further faces add less than three times the size of one face without its DNA file and
+    # its image, because these are stored once.
     once = len(rigs[0]["risorius_dna"]["risorius_bytes"]) + PICTURE
     assert grown < 3 * (alone - once)
     scene.set_controls(rigs[1], jawOpen=0.8)
@@ -128,7 +129,7 @@ def _other_space(image, _folder):
 
 
 def _other_bytes(image, folder):
-    """Pack another noise picture of the same size into an image."""
+    """Pack another picture of random pixels into an image; its width and height are the same."""
     _picture(folder / "other.png", 99)
     content = (folder / "other.png").read_bytes()
     image.pack(data=content, data_len=len(content))
@@ -329,7 +330,11 @@ def test_appended_beside_an_equal_face(textured, tmp_path):
 
 
 def test_faces_of_an_older_version_share_after_a_save(textured, tmp_path):
-    """In a .blend of an older version, each face has its own Text and images without hashes."""
+    """Equal faces of an older version of the add-on share their file and images after a save.
+
+    In such a .blend file, each face has its own text data-block and its own images, and the images
+    have no hashes.
+    """
     first, second = scene.load(textured), scene.load(textured)
     second["risorius_dna"] = first["risorius_dna"].copy()
     for node in scene.meshes(second)[0].data.materials[0].node_tree.nodes:
@@ -350,7 +355,10 @@ def test_faces_of_an_older_version_share_after_a_save(textured, tmp_path):
 
 
 def test_what_only_says_to_be_equal_is_not_shared(textured, tmp_path):
-    """The hash of a stored file or image is computed, not taken from a property."""
+    """A file or image whose properties state wrong contents is not shared.
+
+    The add-on computes the hash of the contents, and does not trust a stored hash.
+    """
     first = scene.load(textured)
     text = first["risorius_dna"]
     text["risorius_bytes"] = text["risorius_bytes"][:-9]
@@ -367,7 +375,10 @@ def test_what_only_says_to_be_equal_is_not_shared(textured, tmp_path):
 
 
 def test_a_face_has_one_live_key_where_nothing_else_is_chosen(dna_file):
-    """One live key is the default; 92 keys of 17,465 vertices, one per channel, take 19 MB."""
+    """By default each mesh has one live shape key for the sum of all channels.
+
+    One key per channel would take 19 MB for a mesh of 17,465 vertices with 92 channels.
+    """
     rig = scene.load(dna_file)
     scene.set_controls(rig, jawOpen=0.5)
     keys = [[b.name for b in m.data.shape_keys.key_blocks] for m in scene.meshes(rig).values()]

@@ -19,8 +19,9 @@ GUI = [
     "CTRL_L_eye.ty",
     "CTRL_L_brow.ty",
 ]
-# Rows (input, output, from, to, slope, cut) of the GUI table. Input 0 has two rows with different
-# slopes, inputs 3 and 4 drive different outputs up and down, and input 5 is in degrees.
+# Rows (input, output, from, to, slope, cut) of the table that computes raw controls from GUI
+# controls. Input 0 has two rows with different slopes. Inputs 3 and 4 drive one output with
+# positive values and another output with negative values. Input 5 is in degrees.
 ROWS = [
     (0, 0, 0.0, 0.5, 0.5, 0.0),
     (0, 0, 0.5, 1.0, 1.5, -0.5),
@@ -35,7 +36,7 @@ ROWS = [
 
 
 def board_face():
-    """The small face with GUI controls for a board."""
+    """The Dna of the small face, with GUI controls and the table ROWS for a face board."""
     dna = small_face()
     dna.gui_control_names = GUI
     names = ("input_indices", "output_indices", "from_values", "to_values")
@@ -53,7 +54,7 @@ def board_file(tmp_path_factory):
 
 @pytest.fixture
 def rig(board_file):
-    """A face with a board that moves it."""
+    """An imported face that its face board moves."""
     rig = scene.load(board_file)
     scene.add_board()
     return rig
@@ -71,9 +72,14 @@ def put(rig, **places):
 
 
 def raw_by_rows(gui, count=11):
-    """Raw controls computed from ROWS.
+    """Raw controls computed from the rows of ROWS, float64[count].
 
-    Of rows with the same input and output, only the first whose range contains the input counts.
+    Of the rows with the same input and output, only the first row counts whose range from `from` to
+    `to` contains the value of the input.
+
+    Args:
+        gui: name of a GUI control -> value.
+        count: number of raw controls.
     """
     raw, done = np.zeros(count), set()
     for control, out, low, high, slope, cut in ROWS:
@@ -94,7 +100,7 @@ def lead(rig):
 
 
 def shown(rig):
-    """Short name of a control -> its value according to the add-on; controls at 0 are left out."""
+    """Short name of a control -> value that the add-on gives, for all controls that are not 0."""
     values = scene.submodule("scene.character.sides").values_of(rig)
     return {name.rpartition(".")[2]: round(v, 5) for name, v in values.items() if v}
 
@@ -171,7 +177,7 @@ def test_a_keyed_board_plays_at_any_frame(rig, board_file, hidden):
 
 
 def test_a_keyed_board_renders(rig, board_file, tmp_path):
-    """A rendered frame has the pose of this frame."""
+    """A rendered frame shows the pose of the board's keys at this frame."""
     _key_jaw(rig)
     render = bpy.context.scene.render
     render.engine, render.resolution_x, render.resolution_y = "CYCLES", 8, 8
@@ -206,7 +212,8 @@ def test_switching_keeps_the_pose_and_says_what_is_lost(board_file):
     assert "risorius_lead" not in scene.controls(rig)
     assert len(scene.controls(rig).pose.bones) == 6  # a board is only made on request
     scene.add_board()
-    # One handle drives eyeLookUpL and eyeLookDownL, so only the larger of both values stays.
+    # One handle drives eyeLookUpL by its way up and eyeLookDownL by its way down. It cannot show
+    # both, so only the larger value stays.
     expected = {"jawOpen": 0.4, "mouthCornerPullL": 0.6, "eyeLookUpL": 0.5}
     assert shown(rig) == expected
     keys = scene.submodule("scene.animation.board_keys")

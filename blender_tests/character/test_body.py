@@ -19,10 +19,12 @@ NAMES = {
 
 
 def _body(names, scale=1.0, turn=0.0):
-    """A chain of bones with rolls, upright in the world, in an object with scale and rotation.
+    """An armature that stands for a body: a chain of bones with rolls.
+
+    The chain is upright in world space, whatever the scale and rotation of the object.
 
     Args:
-        names: names of the bones from the lowest to the highest; empty names are left out.
+        names: names of the bones from the lowest to the highest; an empty name makes no bone.
         scale: scale of the object.
         turn: rotation of the object about x, in radians.
     """
@@ -99,7 +101,7 @@ def test_head_and_neck_of_a_body_of_any_name_and_scale(dna_file, names, scale, t
     joint = next(b.name for b in rig.pose.bones if b.bone["dna_joint"] == 2)
     straight = _world(rig, joint).to_quaternion()
     before = _world(body, head).to_quaternion()
-    # The base moves the whole face; the body's head bone rotates the face's head equally.
+    # The lowest bone of the body moves the whole face.
     body.pose.bones[base].matrix_basis = Matrix.Rotation(0.5, 4, "Y")
     scene.update(body)
     bpy.context.view_layer.update()
@@ -229,7 +231,7 @@ def test_faces_are_imported_side_by_side(dna_file):
     assert tuple(scene.controls(rigs[0]).location) == (0.0, 0.0, 0.0)
     for (_left, right), (left, _right) in itertools.pairwise(spans):
         assert left > right
-    # A face that was moved away leaves its place to the next import.
+    # After the face at the origin was moved away, the next imported face gets this place.
     scene.controls(rigs[0]).location = (0.0, 5.0, 0.0)
     bpy.context.view_layer.update()
     assert tuple(scene.controls(scene.load(dna_file, "LIVE")).location) == (0.0, 0.0, 0.0)

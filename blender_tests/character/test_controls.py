@@ -25,7 +25,7 @@ def test_control_bones_are_told_apart_by_outline_and_colour(dna_file):
     outlines, colours = {}, set()
     for bone in bones:
         line = bone.custom_shape.data
-        # a closed line: each corner has two edges
+        # The outline is a closed line, so each of its corners is in two edges.
         ends = [v for edge in line.edges for v in edge.vertices]
         assert sorted(ends) == sorted([*range(len(line.vertices))] * 2)
         far = max(vertex.co.length for vertex in line.vertices)
@@ -197,7 +197,7 @@ TURN = ["turn.x", "turn.y", "turn.z", "turn.w"]
 
 @pytest.fixture
 def turning(tmp_path):
-    """A face with sliders for the four components of a quaternion."""
+    """A face with four raw controls that are the components of the quaternion of a joint."""
     dna = small_face()
     dna.raw_control_names = [*CONTROLS[:7], *TURN]
     dna.twist_swing_behavior.twists = [

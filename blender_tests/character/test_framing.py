@@ -26,8 +26,11 @@ def _state():
 
 
 def _on_screen(points):
-    """Coordinates of points in the region of the 3D view, from (0, 0) at the lower left to (1, 1).
-    A temporary camera with the view's place, rotation and lens projects them."""
+    """Coordinates of points in the region of the 3D view, float64[N, 2].
+
+    (0, 0) is the lower left corner of the region, (1, 1) the upper right corner. A temporary camera
+    with the place, rotation and lens of the view projects the points.
+    """
     area, view = _area(), _view()
     region = next(r for r in area.regions if r.type == "WINDOW")
     data = bpy.data.cameras.new("view")
@@ -50,7 +53,7 @@ def _corners(item):
 
 @pytest.fixture
 def window(monkeypatch):
-    """Make the import behave as in a Blender with a window, although the test has none."""
+    """Let the import operator believe that Blender has a window, although the test has none."""
     fake = SimpleNamespace(app=SimpleNamespace(background=False))
     monkeypatch.setattr(scene.submodule("ui.file.import_operators"), "bpy", fake)
 

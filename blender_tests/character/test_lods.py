@@ -21,7 +21,7 @@ def _shown(rig, flag="hide_viewport"):
 
 
 def _camera(distance):
-    """A camera at this distance in front of the small face's head bone."""
+    """Add a camera for the scene at this distance, in Blender units, in front of the head bone."""
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     bpy.context.scene.collection.objects.link(camera)
     bpy.context.scene.camera = camera
@@ -103,10 +103,10 @@ def test_the_distance_chooses_with_hysteresis_in_the_viewport(mode, dna_file):
 
 @pytest.mark.parametrize("order", [(1, 2, 3), (3, 2, 1), (2,)])
 def test_renders_take_the_level_of_the_distance_alone(dna_file, tmp_path, order):
-    """The level in renders depends only on the distance.
+    """The level of detail in renders depends only on the distance at the rendered frame.
 
-    At frame 2 the distance is within the viewport's tolerance, where the level depends on earlier
-    frames.
+    At frame 2 the distance is slightly above the limit of a level. There the viewport keeps the
+    level of the frame that was shown before, but a render must not.
     """
     rig = _load(dna_file)
     camera = _camera(1.0)

@@ -15,7 +15,7 @@ NEAR = 4e-3  # tolerance: equal float32 quaternions may differ by an angle of 0.
 
 @pytest.fixture
 def face(tmp_path):
-    """Returns a function that imports a face with neck poses and returns its rig and Dna."""
+    """A function that saves and imports a face with neck poses, and returns its rig and its Dna."""
 
     def make(**options):
         path = tmp_path / "neck.dna"
@@ -36,7 +36,7 @@ def _rest(dna, joint):
 
 
 def _armature_turn(dna, joint, local):
-    """Convert a joint's own rotation (x, y, z, w) to a rotation about the armature's axes."""
+    """Convert a rotation (x, y, z, w) about a joint's own axes to one about the armature's axes."""
     x, y, z, w = local
     turn = np.array(Quaternion((w, x, y, z)).to_matrix(), np.float64)
     basis = _axes(dna) @ _rest(dna, joint)
@@ -44,7 +44,10 @@ def _armature_turn(dna, joint, local):
 
 
 def _own_turn(dna, joint, turn):
-    """The inverse of _armature_turn: x, y, z, w about the joint's axes, with w at least 0."""
+    """Convert a rotation about the armature's axes to one about a joint's own axes.
+
+    Returns the quaternion (x, y, z, w) with w at least 0, float64[4].
+    """
     basis = _axes(dna) @ _rest(dna, joint)
     local = basis.T @ np.array(turn.to_matrix(), np.float64) @ basis
     w, x, y, z = Matrix(local.tolist()).to_quaternion()
@@ -52,7 +55,7 @@ def _own_turn(dna, joint, turn):
 
 
 def _pose(rig, bone, turn):
-    """Rotate a control bone about the armature's axes."""
+    """Rotate a control bone from rest by the quaternion `turn` about the armature's axes."""
     item = scene.controls(rig).pose.bones[bone]
     rest = item.bone.matrix_local.to_quaternion()
     item.rotation_mode = "QUATERNION"
@@ -60,7 +63,13 @@ def _pose(rig, bone, turn):
 
 
 def _wanted(dna, neck=None, head=None, **sliders):
-    """Blend shape channel values for rotations of neck and head about the armature's axes."""
+    """Values of the blend shape channels by risorius.Rig, float32[channels].
+
+    Args:
+        dna: Dna of the face.
+        neck, head: rotations of the joints about the armature's axes; None: at rest.
+        sliders: short name of a raw control -> value.
+    """
     rig = risorius.Rig(dna)
     raw = rig.initial_raw_controls.copy()
     names = list(rig.raw_control_names)
@@ -285,7 +294,7 @@ def test_an_override_of_a_linked_face_fires_them(face, tmp_path):
 
 
 def _nods(rig):
-    """Animate the head's control bone, and limit the rotation of the joint's bone."""
+    """Animate the head's control bone, and limit the rotation of the head joint by a constraint."""
     bone = scene.controls(rig).pose.bones["head"]
     bone.rotation_mode = "XYZ"
     for frame, angle in ((1, 0.0), (5, 0.8)):
@@ -298,7 +307,7 @@ def _nods(rig):
 
 
 def _seen_turn(rig):
-    """The rotation about the armature's axes that Blender shows for the head's joint."""
+    """The rotation of the head's joint from rest that Blender shows, about the armature's axes."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bone = seen.pose.bones["head"]
     local = seen.convert_space(
@@ -363,11 +372,12 @@ def test_keys_of_a_joints_own_bone_fire_them(face):
 
 
 def _follow(rig, bone, by="parent"):
-    """Make the head's joint follow an object that the same armature moves.
+    """Make the head's joint copy the rotation of an object that the same armature moves.
 
     Args:
         rig: the deforming armature.
-        bone: name of the object's parent bone, or for a driver the index of a blend shape channel.
+        bone: with "parent", the name of the bone that is the object's parent; with "driver", the
+            index of the blend shape channel that drives the object's rotation.
         by: "parent" or "driver".
     """
     target = bpy.data.objects.new("target", None)

@@ -56,7 +56,7 @@ def test_from_the_front_no_outline_lies_over_the_eyes_and_all_lie_near_the_head(
 
 
 def test_outlines_of_an_older_file_move_beside_the_face(dna_file, tmp_path):
-    """Older versions saved outlines over the eyes."""
+    """Outlines that an older version of the add-on saved over the eyes move beside the face."""
     made = "4.2.23"
     folder = shutil.copytree(past.DATA / made, tmp_path / made)
     bpy.ops.wm.open_mainfile(filepath=str(folder / "bones.blend"))
@@ -107,9 +107,9 @@ def rig_name(path):
 
 
 def test_a_copy_that_is_deleted_leaves_the_outlines_to_the_face(rig, tmp_path):
-    """A copy made by Shift-D shares the outlines; deleting it does not remove them.
+    """A duplicate of a face shares the outlines; deleting the duplicate does not remove them.
 
-    A save removes the outlines of a face that was deleted.
+    After the face itself was deleted, saving the file removes the outlines.
     """
     held = [b.custom_shape for b in scene.controls(rig).pose.bones]
     for item in bpy.context.view_layer.objects:

@@ -38,7 +38,7 @@ def _same_in_both_modes(rig, atol=2e-6):
 
 
 def _own_key(rig, name="own"):
-    """A shape key of the user with a moved point, a value, a range and a mask."""
+    """Add a shape key as a user would: with a moved vertex, a value, a range and a vertex group."""
     head = _head(rig)
     block = head.shape_key_add(name=name, from_mix=False)
     block.points[3].co.z += 0.02
@@ -130,7 +130,10 @@ def test_the_order_of_keys_returns(dna_file):
 
 @pytest.mark.parametrize("name", ["jaw", "pull_l"])
 def test_a_moved_basis_does_not_make_keys_edited(dna_file, name):
-    """If edit mode moves the basis, other shape keys move too; this does not mark them edited."""
+    """An edit of the basis in edit mode does not make other shape keys count as edited.
+
+    Blender moves the other shape keys with the basis.
+    """
     rig = scene.load(dna_file, "KEYS")
     _move_in_edit_mode(_head(rig), range(0, 100, 3))
     _same_in_both_modes(rig)
@@ -202,7 +205,10 @@ def test_a_driven_key_set_by_hand_is_not_stuck(dna_file):
 
 
 def _channel_of(rig, path, name, value):
-    """Largest coordinate difference of both meshes from the oracle with one channel at `value`."""
+    """Largest coordinate difference between both meshes and the oracle, in metres.
+
+    In the oracle, the blend shape channel `name` has the weight `value`.
+    """
     import risorius
     from support import oracle
 

@@ -31,7 +31,10 @@ def mode(request):
 
 
 def _load_rig_oracle():
-    """Load the oracle by its path, because this folder has another module `oracle`."""
+    """Load tests/python/support/oracle.py, the oracle that computes poses from raw controls.
+
+    It is loaded by its path, because blender_tests/support has another module `oracle`.
+    """
     place = ROOT / "tests" / "python" / "support" / "oracle.py"
     described = importlib.util.spec_from_file_location("rig_oracle", place)
     module = importlib.util.module_from_spec(described)
@@ -43,7 +46,7 @@ RIG_ORACLE = _load_rig_oracle()
 
 
 class _Face:
-    """An imported file, and the vertices that it must show."""
+    """An imported face, and the vertices that Blender must show for it."""
 
     def __init__(self, path, mode, levels=range(8)):
         self.rig = scene.load(path, mode, lods=tuple(i in levels for i in range(8)))
@@ -51,14 +54,25 @@ class _Face:
         self.labels = scene.submodule("logic.base.names").unique_labels(self.dna.raw_control_names)
 
     def wanted(self, raw, lod):
-        """Mesh index -> vertices float64[V, 3] for raw controls float64[R]."""
+        """The expected vertices: mesh index -> float64[V, 3], in Blender's space.
+
+        Args:
+            raw: values of the raw controls, float64[R].
+            lod: level of detail.
+        """
         joints, shapes, _maps, _controls = RIG_ORACLE.evaluate(self.dna, raw, lod, settle=True)
         pose = SimpleNamespace(joints=joints[0].reshape(-1, 9), blend_shapes=shapes[0])
         there = self.dna.lod_mesh_mapping[lod]
         return {int(m): oracle.vertices(self.dna, int(m), pose) for m in there}
 
     def error(self, shown, raw, lod):
-        """Largest coordinate difference of shown and wanted vertices, as a share of face size."""
+        """Largest coordinate difference of shown and expected vertices, as a share of face size.
+
+        Args:
+            shown: mesh index -> vertices that Blender shows, float64[V, 3].
+            raw: values of the raw controls, float64[R].
+            lod: level of detail.
+        """
         wanted = self.wanted(raw, lod)
         assert set(shown) == set(wanted)
         size = max(np.ptp(points, axis=0).max() for points in wanted.values())
@@ -75,7 +89,10 @@ class _Face:
         scene.update(scene.controls(self.rig))
 
     def animate(self, seed):
-        """Key every control with random values. Returns a function: frame -> raw float64[R]."""
+        """Insert keys with random values on every slider at frames 1, 5 and 10.
+
+        Returns a function: frame -> values of the raw controls at this frame, float64[R].
+        """
         random = np.random.default_rng(seed)
         bone = scene.face(self.rig)
         for frame in (1, 5, 10):
@@ -91,7 +108,11 @@ class _Face:
 
 @pytest.fixture(params=["small", "medium", "units"])
 def path(request, tmp_path):
-    """Files: two LODs and odd names; four LODs, 122 joints and ten meshes; other axes and units."""
+    """The path of one of three DNA files.
+
+    "small" has two LODs and unusual names; "medium" has four LODs, 122 joints and ten meshes;
+    "units" has other axes and units.
+    """
     if request.param == "small":
         small_face().save(str(tmp_path / "small.dna"))
         return tmp_path / "small.dna"

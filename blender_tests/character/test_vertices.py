@@ -100,7 +100,8 @@ def test_faces_point_outwards_in_mirrored_files(tmp_path):
         path = tmp_path / f"{number}.dna"
         small_face(axes=axes).save(str(path))
         head = scene.meshes(scene.load(path))[0]
-        # In the coordinates of the file the patch is counter-clockwise. If the file's axes are
-        # left-handed, it is clockwise in space, and the import must reverse its polygons.
+        # In the coordinates of the file, the polygons of the head are counter-clockwise seen from
+        # outside. If the file's axes are left-handed, the polygons are clockwise in space, and the
+        # import must reverse them.
         normal = np.mean([p.normal[:] for p in head.data.polygons], axis=0)
         assert normal[1] < -0.3

@@ -23,7 +23,7 @@ def rig(dna_file):
 
 @pytest.fixture
 def man():
-    """The sample face, and the vertex of its head that mouthCornerPullL moves most."""
+    """The sample man, and the index of the head vertex that mouthCornerPullL moves most."""
     bpy.ops.risorius.add_character()
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     scene.set_controls(rig, mouthCornerPullL=1.0)
@@ -40,7 +40,7 @@ def rest_of(head):
 
 
 def place(rig, vertex=VERTEX, mesh=HEAD):
-    """The place at which Blender shows a vertex, float64[3]."""
+    """The place at which Blender shows a vertex of a mesh, float64[3] in metres."""
     return scene.evaluated(scene.meshes(rig)[mesh])[vertex]
 
 
@@ -55,9 +55,10 @@ def drag(offset, vertex=VERTEX, **options):
 
 
 def reach(rig, path, vertex=VERTEX, values=POSE):
-    """The motion of a head vertex if the rig's sliders get `values`, float64[3] in metres.
+    """The displacement of a head vertex if the sliders in `values` change, float64[3] in metres.
 
-    The oracle computes it from the DNA file `path`.
+    The other sliders keep their present values. The oracle computes the displacement from the DNA
+    file `path`.
     """
     dna = risorius.load(str(path))
     raw = scene.raw_of(rig, path)
@@ -180,7 +181,7 @@ def test_handles_lie_apart_on_both_sides(man):
 
 
 def two_handles(rig):
-    """The handles that a smile moves most on each side of the mouth: (mesh, vertex)."""
+    """The two handles that mouthCornerPullL and mouthCornerPullR move most, each (mesh, vertex)."""
     rest = {point: place(rig, point[1], point[0]) for point in offered(rig)}
 
     def most(name):
@@ -207,7 +208,12 @@ def test_selected_handles_go_together(man):
     starts = [place(rig, vertex, mesh) for mesh, vertex in (one, other)]
 
     def share(number, point):
-        """How far a handle has followed the drag: 0 not at all, 1 completely."""
+        """The handle's motion along the drag, as a share of the drag.
+
+        Args:
+            number: index of the handle in `starts`.
+            point: (mesh, vertex) of the handle.
+        """
         way = place(rig, point[1], point[0]) - starts[number]
         return way @ offset / (offset @ offset)
 
@@ -396,7 +402,7 @@ def test_what_lies_under_a_ray(rig):
 
 
 def oracle_place(rig, vertex):
-    """Place of a vertex of the face at rest."""
+    """Place of a head vertex while the face is at rest, float64[3] in metres."""
     data = scene.meshes(rig)[HEAD].data
     return np.array(data.vertices[vertex].co)
 
@@ -463,7 +469,8 @@ def test_a_drag_depends_on_its_end_and_not_on_its_way(rig, dna_file):
 def test_a_dragged_brow_turns_no_eye_and_both_sides_go_alike(man):
     """On the sample man, a dragged brow moves no look control.
 
-    A symmetric drag sets both sides equally, although the two sides of his face differ.
+    A symmetric drag gives the sliders of both sides equal values, although the two sides of the
+    sample man's face differ.
     """
     rig, corner = man
     stroke = scene.submodule("scene.drag.stroke")

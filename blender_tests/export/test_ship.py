@@ -18,12 +18,13 @@ from support.animation import animate
 
 FRAMES = (1, 3, 5, 8, 10)
 ENDINGS = {"GLTF": "glb", "FBX": "fbx", "USD": "usdc", "ALEMBIC": "abc"}
-# Allowed error of each format, as a share of the head's size.
+# Format -> allowed error of the imported vertices, as a share of the head's size.
 NEAR = {
     "ALEMBIC": 5e-6,  # stores vertices: float32 at 1.6 m rounds by 6e-7 of the head's width
     "GLTF": 2e-5,  # float32 joints per frame, weights normalised again, axes rotated
     "FBX": 2e-5,  # the same, with rotations as Euler angles in degrees
-    # Joint scales are half floats: an error of 2**-11 at each of two successive joints.
+    # The format stores scales of joints as half floats. Each of two joints in a chain then adds
+    # an error of up to 2**-11.
     "USD": 1e-3,
 }
 
@@ -37,7 +38,10 @@ def _film(items, frames=FRAMES):
 
 
 def _is_built(kind):
-    """Whether this Blender has the exporter; if not, the operator must report it."""
+    """Whether this Blender has an exporter for the format.
+
+    If not, check that the operator reports this.
+    """
     switch = {"USD": "usd", "ALEMBIC": "alembic"}.get(kind)
     if switch is None or getattr(bpy.app.build_options, switch):
         return True
@@ -56,7 +60,7 @@ def _export(kind, tmp_path, **options):
 
 
 def _import(kind, path):
-    """Import a file. Returns its meshes."""
+    """Import a file of the format. Returns the imported mesh objects."""
     before = set(bpy.data.objects)
     if kind == "GLTF":
         bpy.ops.import_scene.gltf(filepath=str(path), disable_bone_shape=True)
@@ -70,7 +74,10 @@ def _import(kind, path):
 
 
 def _partner(points, wanted):
-    """Index of the imported vertex nearest to each wanted one; some formats reorder vertices."""
+    """For each expected vertex, the index of the nearest imported vertex, int[V].
+
+    Some formats change the order of vertices.
+    """
     tree = KDTree(len(points))
     for i, point in enumerate(points):
         tree.insert(Vector(point), i)
@@ -81,7 +88,11 @@ def _partner(points, wanted):
 def _error(film, wanted):
     """The largest coordinate difference of vertices in all frames, as a share of the head's size.
 
-    Imported vertices are matched to the wanted ones at the first frame.
+    Each expected vertex is compared with the imported vertex that is nearest at the first frame.
+
+    Args:
+        film: for each frame, the imported vertices of each mesh.
+        wanted: for each frame, the expected vertices of each mesh.
     """
     size = max(np.ptp(p, axis=0).max() for p in wanted[0])
     points = [np.concatenate(meshes) for meshes in film]
@@ -108,7 +119,7 @@ def test_the_file_gives_the_same_vertices(kind, dna_file, tmp_path):
 
 
 def _everywhere(rig):
-    """The state of the .blend that an export must not change."""
+    """The state of the .blend file, which an export must not change."""
     layer = bpy.context.view_layer
     return (
         scene.counts(),
@@ -127,7 +138,7 @@ def _everywhere(rig):
 
 
 def _json_of(path):
-    """The JSON of a .glb file."""
+    """The content of the JSON chunk of a .glb file."""
     content = path.read_bytes()
     length, _kind = struct.unpack_from("<II", content, 12)
     return json.loads(content[20 : 20 + length])
@@ -195,7 +206,10 @@ def test_a_face_that_walks_and_a_part_of_the_range(kind, options, dna_file, tmp_
 
 
 def _fbx_tree(path):
-    """Object -> parent object, and object -> kind of its attribute, as stored in the FBX file."""
+    """Object -> parent object, and object -> kind of its node attribute, read from an FBX file.
+
+    Objects are given by name. A kind of attribute is, for example, "Mesh" or "LodGroup".
+    """
     from io_scene_fbx import parse_fbx
 
     root, _version = parse_fbx.parse(str(path))
@@ -287,7 +301,7 @@ def test_controls_as_csv_and_clip(dna_file, tmp_path):
     assert header[-3:] == ["head.yaw", "head.pitch", "head.roll"]
     assert len(set(header)) == len(header) == 1 + 11 + 3
     rate = bpy.context.scene.render.fps
-    # Second 0 is the scene's first frame, as for a sound that starts there.
+    # Time 0 s of the file is the scene's first frame, as for a sound that starts there.
     first = bpy.context.scene.frame_start
     np.testing.assert_allclose(table[:, 0], (np.arange(2, 4.1, 0.5) - first) / rate)
     for row, frame in zip(table, np.arange(2, 4.1, 0.5), strict=True):
@@ -295,7 +309,8 @@ def test_controls_as_csv_and_clip(dna_file, tmp_path):
         raw = scene.raw_of(rig, dna_file)
         assert np.float32(row[1]) == raw[0]
         assert np.float32(row[header.index("CTRL_expressions.eyeLookUpL")]) == raw[6]
-        # The head bone is upright: its x and y axes are the armature's x and z axes.
+        # The head bone is upright: its x axis is the armature's x axis, its y axis the armature's z
+        # axis. So the rotation is converted to the armature's axes.
         turn = scene.controls(rig).pose.bones["head"].rotation_euler.to_quaternion()
         rest = scene.controls(rig).data.bones["head"].matrix_local.to_quaternion()
         ahead = (rest @ turn @ rest.inverted()) @ Vector((0, -1, 0))
@@ -394,7 +409,8 @@ def test_without_room_the_old_file_stays(kind, dna_file, tmp_path, monkeypatch):
 def _no_room(kind, monkeypatch):
     """Limit every file to 4000 bytes, which simulates a full disk.
 
-    For Alembic, a function that writes a few bytes and fails replaces the export function.
+    The Alembic exporter would end the process, so for Alembic the export function is replaced by
+    one that writes a few bytes and raises an error.
     """
     import resource
     import signal

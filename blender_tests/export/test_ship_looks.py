@@ -24,7 +24,7 @@ SHOWN = ("head", "eyeLeft", "teeth", "eyelashes", "eyeshell")
 
 
 def _face(tmp_path):
-    """A face with a texture on its head, and meshes with procedural materials."""
+    """Save a face with a texture for its head, and meshes without textures. Returns the path."""
     random = np.random.default_rng(3)
     where = np.array([3.0, 158.0, 9.0])
     meshes = {"head_lod0_mesh": patch(random, (12, 14), 10.0, where * (0, 1, 0), (1, 2, 3), (0,))}
@@ -50,7 +50,7 @@ def _export(kind, folder, **options):
 
 
 def _read(kind, path):
-    """The content of a file as another program reads it."""
+    """The content of an exported file, as a program other than Blender reads it."""
     if importlib.util.find_spec(NEEDS[kind]) is None or bpy.app.binary_path:
         pytest.skip(f"EXTRA NOT RUN: {kind} files read by {NEEDS[kind]}, which is not there")
     if kind == "FBX" and shutil.which("assimp") is None:
@@ -62,7 +62,7 @@ def _read(kind, path):
 
 
 def _outside(kind, found):
-    """The points of a mesh read by another program, in Blender's axes and metres."""
+    """The vertices of a mesh that another program has read, in Blender's axes and metres."""
     points = np.array(found["points"])
     if kind == "USD":  # the file states that z is up
         return points
@@ -71,11 +71,15 @@ def _outside(kind, found):
 
 
 def _everything():
-    """The state that an export must keep: datablocks, users of materials, visibility."""
+    """The state that an export must not change.
+
+    It contains names of data-blocks, numbers of users of materials, UV layers, material slots,
+    sizes of node trees, and the render engine.
+    """
     kinds = ("objects", "meshes", "scenes", "actions", "shape_keys", "armatures", "images")
     found = {k: sorted(x.name for x in getattr(bpy.data, k)) for k in kinds}
-    # Users are compared only for materials, because Blender 4.2 counts a copied material twice as
-    # a user of its images.
+    # Numbers of users are compared only for materials. Numbers of users of images differ, because
+    # Blender 4.2 counts a copied material twice as a user of its images.
     found["materials"] = sorted((x.name, x.users) for x in bpy.data.materials)
     found["layers"] = {m.name: [y.name for y in m.uv_layers] for m in bpy.data.meshes}
     found["slots"] = {o.name: [s.material.name for s in o.material_slots] for o in bpy.data.objects}
@@ -113,7 +117,7 @@ def test_another_program_finds_colours_names_and_time(kind, tmp_path, capfd):
 
 
 def _is_quiet(captured):
-    """Check that only the report of the operator (`Info: out.…`) and empty lines were printed."""
+    """Check that Blender printed only the operator's report (`Info: out.…`) and empty lines."""
     lines = [x for x in captured.out.splitlines() if x.strip()]
     assert captured.err == ""
     assert [x for x in lines if not x.startswith("Info: out.")] == []
@@ -131,7 +135,7 @@ def _has_names(kind, names):
 
 
 def _has_colors(kind, found):
-    """Check colours: head texture, iris, light teeth, lashes with separate hairs."""
+    """Check the colours: the head's texture, pupil, iris and sclera, light teeth, dark lashes."""
     meshes = {n.removesuffix("_lod0_mesh"): m for n, m in found["meshes"].items()}
     head = np.array(meshes["head"]["colors"])
     x = _outside(kind, meshes["head"])[:, 0]

@@ -47,7 +47,7 @@ def test_the_page_holds_what_the_face_does_and_says(dna_file, tmp_path, sound, m
     stage.render.fps = 24
     path = tmp_path / "face.html"
     strips = scene.submodule("scene.base.compat").strips_of(stage)
-    # A Blender without audio support cannot add a sound strip; then the page has no sound.
+    # A Blender without audio support cannot add a sound strip. Then the exported page has no sound.
     heard = bpy.app.build_options.audaspace
     if heard:
         strips.new_sound("voice", str(sound), 1, 5)

@@ -30,7 +30,7 @@ weights = { jawOpen = 0.8, mouthCornerPullL = 0.6 }
 
 @pytest.fixture
 def folder(tmp_path):
-    """A library folder with expressions."""
+    """A folder with the user's own expressions of OWN, which is the library of the add-on."""
     path = tmp_path / "library"
     path.mkdir()
     (path / "own.toml").write_text(OWN, encoding="utf-8")
@@ -65,7 +65,7 @@ def values(face):
 
 
 def other(**changed):
-    """The sliders of START with some other values."""
+    """The slider values of START, except the values in `changed`, for comparisons."""
     names = {"jaw": JAW, "left": LEFT, "right": RIGHT, "brow": BROW}
     return pytest.approx({**START, **{names[k]: v for k, v in changed.items()}}, abs=1e-6)
 
@@ -75,13 +75,14 @@ def apply(name, **how):
 
 
 def refused(call, **given):
-    """The error text of an operator that must refuse."""
+    """The error text of an operator call that must fail."""
     with pytest.raises(RuntimeError) as error:
         call(**given)
     return str(error.value)
 
 
-# options of blending -> sliders afterwards, calculated by hand from START and OWN
+# (options of the operator, sliders that it changes -> new values); the values were calculated by
+# hand from the sliders START and the expression "wide" of OWN.
 MIXED = [
     ({"only": True}, {"jaw": 0.8, "left": 0.6, "right": 0, "brow": 0}),
     ({"only": False}, {"jaw": 0.8, "left": 0.6}),
@@ -241,7 +242,7 @@ def test_export_and_import_take_all_or_none(rig, folder, tmp_path):
 
 
 def posed(face, *selected):
-    """Enter pose mode with these bones selected."""
+    """Enter pose mode with only these bones selected. Returns the control armature."""
     controls = scene.controls(face)
     bpy.context.view_layer.objects.active = controls
     bpy.ops.object.mode_set(mode="POSE")
@@ -264,7 +265,8 @@ def test_blenders_own_operators_apply_the_assets(rig):
     controls = posed(rig)
     controls.pose.apply_pose_from_action(action)
     goal = {JAW: joy[JAW], LEFT: joy[LEFT], RIGHT: joy[RIGHT]}
-    # The expression moves no brow of this face, so the asset has no values for the brow region.
+    # The expression moves no brow slider of this face, so the asset has no values for the brow
+    # region, and the brow keeps its value.
     assert values(rig) == pytest.approx({**START, **goal}, abs=1e-6)
     start(rig)
     controls.pose.blend_pose_from_action(action, blend_factor=0.5)
@@ -301,7 +303,7 @@ JOY = {LEFT: 1.0, RIGHT: 0.94, JAW: 0.24}  # the weights of joy for controls of 
 
 @pytest.fixture
 def lower_jaw(tmp_path, folder):
-    """A face: the jaw joint moves its lower half, and the head joint moves its upper half."""
+    """A face whose lower half follows the jaw joint, and whose upper half the head joint."""
     dna = faces.small_face(head_grid=(14, 21))
     dna.meshes = [dna.meshes[0]]
     dna.mesh_names, dna.lod_count = ["head_lod0_mesh"], 1
@@ -340,8 +342,8 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
     after = oracle.vertices(dna, 0, risorius.Rig(dna).evaluate(moved))
     still = np.linalg.norm(after - before, axis=1) < 1e-6
     assert 0.3 < still.mean() < 0.7
-    # The picture shows the face from the front. Its side is 1.05 times the width or height of the
-    # face, whichever is larger.
+    # The picture shows the face from the front. The square picture is 1.05 times as wide as the
+    # larger of width and height of the face.
     low, high = before.min(axis=0), before.max(axis=0)
     half = 1.05 * (high - low)[[0, 2]].max() / 2
     edge = (before[still, 2].min() - (low + high)[2] / 2) / half  # -1 to 1
@@ -350,7 +352,7 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
     assert 40 < row < 110
     assert apart[row + 12 :].max() < 0.02  # the shading of a hollow reaches slightly further
     assert (apart[: row - 12] > 0.05).mean() > 0.2
-    # The visible area ends at the oracle's vertices.
+    # The columns that the face covers are as many as the width of the oracle's vertices gives.
     shown = (np.abs(rest - np.linspace(rest[0, 0], rest[-1, 0], 160)[:, None]) > 0.05).any(axis=2)
     columns = np.flatnonzero(shown.any(axis=0))
     wide = (high - low)[0] / (2 * half) * 160
@@ -359,7 +361,7 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
 
 @pytest.fixture
 def kept(rig):
-    """The folder with cached pictures of expressions, emptied before and after the test."""
+    """The folder with the stored pictures of expressions; it is emptied before and after a test."""
     folder = scene.submodule("scene.expressions.library").own_folder("thumbnails")
     for path in folder.iterdir():
         path.unlink()

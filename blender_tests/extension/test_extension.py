@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(not PACKAGE, reason="needs --extension ZIP")
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory):
-    """The user folder for all steps, with a face beside it."""
+    """Blender's user folder for all steps; its parent folder contains the DNA file of a face."""
     folder = tmp_path_factory.mktemp("user")
     small_face().save(str(folder.parent / "small.dna"))
     return folder
@@ -35,8 +35,8 @@ def home(tmp_path_factory):
 
 def _run(home, *command):
     settings = os.environ | {"BLENDER_USER_RESOURCES": str(home)}
-    # PYTHONPATH may lead to the bpy module (on Windows, in Wine). Folders with `risorius` are
-    # removed from it, so that the test uses the package of the extension.
+    # PYTHONPATH must keep the folder of the bpy module, which is there in Wine. Folders with a
+    # package `risorius` are removed, so that the step uses the package of the extension.
     paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     kept = (path for path in paths if path and not (Path(path) / "risorius").is_dir())
     settings["PYTHONPATH"] = os.pathsep.join(kept)
@@ -146,6 +146,6 @@ def test_removed_nothing_of_it_is_left(home):
     assert found == NOTHING
     left = _files_of_ours(home)
     if bpy.app.version == (4, 2, 0) and not PROGRAM:
-        # The bpy module of 4.2.0 leaves an unpacked wheel behind, for any extension.
+        # The bpy module of 4.2.0 does not delete the unpacked wheels of a removed extension.
         left = [name for name in left if ".local" not in name]
     assert left == []

@@ -120,7 +120,7 @@ def test_no_permission_gets_a_sentence(dna_file, monkeypatch):
 
 @pytest.fixture
 def work(dna_file, monkeypatch):
-    """Counts how often the DNA file is read, hashed, unpacked, parsed and compiled."""
+    """Count how often the DNA file is read, hashed, unpacked, parsed and compiled."""
     whole, counts = dna_file.read_bytes(), Counter()
     storage = scene.submodule("scene.base.storage")
 
@@ -240,8 +240,8 @@ def test_damaged_data_in_the_blend_is_said_once(dna_file, mode, capsys):
 def _plant_sample(monkeypatch, tmp_path, dna_file, error=None):
     """Set up a user folder of the extension, and a builder of samples that copies a small face.
 
-    The builder raises `error` instead if that is given. Returns: a list that receives the options
-    of each call of the builder.
+    If `error` is given, the builder raises it instead. Returns a list that receives the options of
+    each call of the builder.
     """
     import shutil
 
@@ -271,7 +271,10 @@ def test_add_face_builds_the_sample_once(monkeypatch, tmp_path, dna_file, mode):
 
 
 def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
-    """Tests the texts of the status bar, and Esc, by running the operator's task without window."""
+    """Esc ends the building of a sample face, and the status bar shows the progress before.
+
+    The test runs the operator's task without a window.
+    """
     import risorius_people as sample
 
     operator = scene.submodule("ui.file.import_operators").RISORIUS_OT_add_character

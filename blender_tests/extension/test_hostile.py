@@ -19,7 +19,7 @@ QUICK = {"shape_mode": "LIVE", "use_materials": False}
 
 
 def _one_sentence(text, path):
-    """Check that a message names the file in one printable sentence."""
+    """Check that `text` is one printable sentence with the name of the file `path`."""
     assert "Traceback" not in text, text
     assert Path(path).name in text, text
     assert text.isprintable(), text
@@ -36,9 +36,9 @@ def _take_out():
 
 
 def _offer(path, **options):
-    """Import a file that may be refused, and check that nothing is left.
+    """Import a file that may be refused, and check that no data-block is left afterwards.
 
-    Returns whether it was accepted.
+    A face that was imported is removed. Returns whether the file was accepted.
     """
     before = scene.counts()
     try:
@@ -134,7 +134,7 @@ def test_a_face_that_left_is_not_kept(tmp_path):
 
 
 def _draw_panels():
-    """Draw the panels of ui.face.panel and ui.face.controls_panel. Returns the shown texts."""
+    """Draw the panels of ui.face.panel and ui.face.controls_panel. Returns their texts as one."""
     said = []
     face = "ui.face"
     for panel in (
@@ -270,7 +270,8 @@ def test_a_blend_whose_dna_was_tampered_with(how, dna_file, mode, tmp_path, caps
     assert lines[0].endswith(".")
 
 
-# The author of a .blend also writes length and hash, so neither can be trusted.
+# Whoever makes a hostile .blend file also writes the stored length and hash of the DNA data, so the
+# add-on must trust neither.
 @pytest.mark.parametrize("said", ["nothing", "the truth", "too little", "no number"])
 @pytest.mark.parametrize("begins", ["as a DNA file", "as nothing known"])
 def test_a_small_stream_that_unfolds_to_a_thousand_times_its_size(said, begins, dna_file, capsys):

@@ -20,7 +20,7 @@ VALUES = {
     "an object": "OBJECT",
     "a text": "TEXT",
 }
-# Owner -> names of its custom properties.
+# Kind of data-block or bone (see `_owner`) -> names of the add-on's custom properties on it.
 PROPERTIES = {
     "rig": """risorius_rig risorius_controls risorius_dna risorius_lod risorius_lod_render
         risorius_lod_by_distance risorius_lod_distances risorius_follow risorius_unit
@@ -45,7 +45,8 @@ PROPERTIES = {
     "risorius_landmark_found",
     "landmark": "risorius_landmark risorius_landmark_found",
 }
-# Wrong values that hide the effects of other values: each is tested in a session of its own.
+# (owner, property, key of VALUES): values that would hide the effects of other wrong values. So
+# each is tested with no other wrong value.
 ALONE = (
     ("rig", "risorius_controls", "numbers"),
     ("rig", "risorius_controls", "an object"),
@@ -68,7 +69,10 @@ TOGETHER = [
 
 @pytest.fixture
 def rig(tmp_path):
-    """A small face with LODs and an action, beside a mesh with a landmark, an empty and a text."""
+    """A small face with LODs and an action.
+
+    The scene also has a mesh with a landmark, an empty and a text data-block.
+    """
     path = tmp_path / "small.dna"
     small_face(head_grid=(5, 6)).save(str(path))
     found = scene.load(path, "LIVE", lods=(True,) * 8)
@@ -118,7 +122,12 @@ def _panels():
 
 
 def _use(tmp_path, number):
-    """A short session: sliders, frames, panels, operators, saving and loading."""
+    """Use the face as in a short session: move a slider, show frames, draw panels, call operators.
+
+    Args:
+        tmp_path: folder of the files that the operators read and write.
+        number: number of the session, which gives the value of the slider.
+    """
     context = bpy.context
     controls = bpy.data.objects.get("Small_controls")
     context.view_layer.objects.active = controls
@@ -164,7 +173,7 @@ STEPS = [
 
 
 def _plant(rig, who, name, what):
-    """Set a property to a wrong value, if Blender accepts the value."""
+    """Set the property `name` of the owner `who` to VALUES[what], if Blender accepts this value."""
     owner = _owner(rig, who)
     if name in owner:
         del owner[name]

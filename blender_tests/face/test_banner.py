@@ -10,7 +10,7 @@ from support.heights import lines_of
 from support.layout import Recorder, drawn
 
 JAW = "CTRL_expressions.jawOpen"
-# Name of a mode -> call that starts it, and text of the banner.
+# Name of a mode of the face -> function that starts the mode, and text of the banner in the mode.
 MODES = {
     "tweak": (lambda: bpy.ops.risorius.tweak(first=1, last=20), "Tweak 1-20"),
     "tweak elsewhere": (
@@ -42,7 +42,7 @@ def _banner(rig):
 
 
 def _done(mode):
-    """Run the operator of the button Done."""
+    """Run the operator that the banner's button Done runs in this mode."""
     return getattr(bpy.ops.risorius, mode.operator.partition(".")[2])(**mode.settings)
 
 

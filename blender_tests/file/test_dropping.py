@@ -14,7 +14,7 @@ def _handler():
 
 
 def _drop(*paths):
-    """Call the operator as a drop of files does: with filepath, directory and files."""
+    """Call the import operator as Blender does when files are dropped onto a window."""
     operator = getattr(bpy.ops.risorius, _handler().bl_import_operator.split(".")[1])
     known = operator.get_rna_type().properties.keys()
     given = {

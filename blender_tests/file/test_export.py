@@ -35,7 +35,7 @@ def _report(name="Small"):
 
 
 def _move(rig, mesh, vertex, by):
-    """Move a neutral vertex like edit mode: every shape key moves too."""
+    """Move a neutral vertex by `by` as edit mode does: the vertex moves in every shape key."""
     for block in scene.meshes(rig)[mesh].data.shape_keys.key_blocks:
         co = np.array(block.points[vertex].co) + by
         block.points[vertex].co = co
@@ -54,10 +54,10 @@ def test_untouched_files_of_every_version(mode, tmp_path):
 
 
 def test_untouched_golden_files(tmp_path):
-    """Unedited DNA files of another program are exported byte for byte.
+    """The DNA files of tests/data/golden are exported byte for byte if they are not edited.
 
-    Files that are refused on import are skipped: those without a face, or of a generation
-    that cannot be read.
+    Files that the import refuses are skipped: files without a face, and files of a generation that
+    the package cannot read.
     """
     seen = 0
     for source in sorted(GOLDEN.glob("*.dna")):
@@ -99,10 +99,10 @@ def test_edits_come_back_in_every_convention(tmp_path, conventions):
 
 
 def _only_these_changed(source, out, step):
-    """Check what differs between two DNA files.
+    """Check that an exported DNA file differs from its source by three edits only.
 
-    A position and the deltas of one vertex in each of two shapes differ by multiples of `step`.
-    All else is identical.
+    The edits moved one neutral position, and one vertex in each of two shapes, by multiples of
+    `step`.
     """
     old, new = risorius.load(str(source)), risorius.load(str(out))
     one, two = old.meshes[0], new.meshes[0]
@@ -121,7 +121,7 @@ def _only_these_changed(source, out, step):
         assert list(changed) == [vertex]
         by_now = oracle.to_blender(new, delta[1] - delta[0])[vertex]
         np.testing.assert_allclose(by_now, by, atol=step * 1e-3)
-    # With these values restored, the file equals the imported one.
+    # With the source's positions and shapes, the exported file equals the source.
     two.positions = one.positions
     two.blend_shape_targets = one.blend_shape_targets
     assert new.to_bytes(version=f"2.{old.version}") == old.to_bytes(version=f"2.{old.version}")
@@ -181,7 +181,10 @@ def test_what_is_not_asked_for_is_not_written(dna_file, tmp_path):
 
 
 def test_a_basis_edit_by_edit_mode_is_no_edit_of_keys(dna_file, tmp_path):
-    """Edit mode also moves and rounds all shape keys; only neutral positions are exported."""
+    """An edit of the basis in edit mode is exported as an edit of neutral positions only.
+
+    Edit mode also moves the vertices of all shape keys, and rounds them.
+    """
     import bmesh
 
     rig = scene.load(dna_file, "KEYS")
@@ -229,8 +232,8 @@ def test_edited_joints(tmp_path):
         again = scene.load(out)
         for name, matrix in wanted.items():
             got = np.array(again.data.bones[name].matrix_local)
-            # The axes are inexact, because Blender stores the ends of a bone as float32; here they
-            # are 4 cm apart at a height of 1.7 m.
+            # The axes of a bone are inexact, because Blender stores the two ends of a bone as
+            # float32. Here the ends are 4 cm apart at a height of 1.7 m.
             np.testing.assert_allclose(got[:3, :3], matrix[:3, :3], atol=3e-5)
             np.testing.assert_allclose(got[:3, 3], matrix[:3, 3], atol=1e-6 * size)
         said = next(x for x in _report().splitlines() if x.startswith("Joint FACIAL_L_Eye: "))

@@ -40,7 +40,7 @@ def text_of(name, weight=0.5):
 
 
 def library(folder, *names):
-    """A library folder from another person, with one expression for each name."""
+    """Make a library folder as from another person: one file for an expression of each name."""
     folder.mkdir(parents=True)
     for number, name in enumerate(names):
         (folder / f"{number:02}.toml").write_text(text_of(name), encoding="utf-8")
@@ -52,7 +52,7 @@ def everything(folder):
 
 
 def names_in(folder):
-    """File -> names of its expressions."""
+    """Name of each TOML file in a folder -> names of the expressions in the file."""
     return {p.name: list(risorius.expressions.load(p)) for p in folder.glob("*.toml")}
 
 
@@ -209,7 +209,10 @@ def test_an_image_without_a_path_is_written_beside_the_usd(rig, tmp_path):
 
 
 def _painted(name, folder):
-    """A material whose colour is a packed image with an odd path; its name is `name`, too."""
+    """A material whose colour is a packed image; material and image have the name `name`.
+
+    The path of the image contains characters that are separators on some systems.
+    """
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree

@@ -16,7 +16,10 @@ _SUPPORT = Path(__file__).parents[2] / "tests" / "python" / "support"
 
 
 def _supporting(name):
-    """Load a module of tests/python/support under the name by which other modules import it."""
+    """Load a module of tests/python/support.
+
+    It is entered in sys.modules under `name`, by which other modules of that folder import it.
+    """
     spec = importlib.util.spec_from_file_location(name, _SUPPORT / f"{name}.py")
     sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sys.modules[name])
@@ -30,7 +33,7 @@ METRES = 0.01
 
 
 def to_blender(points):
-    """Convert centimetres with y up to metres with z up."""
+    """Convert points from centimetres with y up to metres with z up, float64[N, 3]."""
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1) * METRES
 
 
@@ -69,7 +72,10 @@ def made_face():
 
 
 def shape(item, name):
-    """Vertices of one shape key, with the object's rotation and scale but not its location."""
+    """Vertices of one shape key after the object's rotation and scale, float[V, 3] in metres.
+
+    The object's location is not added.
+    """
     key = item.data.shape_keys.key_blocks[name]
     out = np.empty(3 * len(key.data), np.float32)
     key.data.foreach_get("co", out)
@@ -119,7 +125,7 @@ def test_what_blender_saves_is_the_same_head(saved, scale, head, tmp_path):
     assert np.ptp(mesh.uvs, axis=0).min() > 0.9
     wanted = face_shapes.expressions(positions)
     assert list(moved) == list(wanted)
-    # Blender may reorder vertices, so each vertex is found by its position.
+    # Blender may change the order of vertices, so each saved vertex is matched by its position.
     unit = METRES * scale
     place = np.array([2.0, 3.0, -1.0]) / 1.5
     apart = np.linalg.norm(mesh.positions[:, None] / unit - positions[None] - place, axis=2)
@@ -215,7 +221,15 @@ def test_a_cancelled_rig_leaves_no_file(head, tmp_path):
 
 
 def _add(name, geometry, shapes=None, place=(0, 0, 0), parent=None):
-    """Add a mesh, given in centimetres with y up, as an object."""
+    """Add a mesh object.
+
+    Args:
+        name: name of the object, the mesh and its material.
+        geometry: (points in centimetres with y up, polygons).
+        shapes: name of a shape key -> displacements, like the points; None: no shape keys.
+        place: location of the object in metres.
+        parent: parent object, or None.
+    """
     points, faces = geometry
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(to_blender(points).tolist(), [], np.asarray(faces).tolist())
@@ -234,10 +248,11 @@ def _add(name, geometry, shapes=None, place=(0, 0, 0), parent=None):
 
 @pytest.fixture
 def whole_head():
-    """A head that looks along +Y, teeth with equally named shape keys, eyes, hair, and a far cube.
+    """A head that looks along +Y, teeth, eyes and hair with an armature as parent, and a cube.
 
-    All but the cube have the same armature as parent. Head and eyes are selected; the eyes, which
-    have no shape keys, are active. Returns the head.
+    The teeth have shape keys with the names of the head's shape keys. The cube is apart and has no
+    parent. Head and eyes are selected. The eyes, which have no shape keys, are the active object.
+    Returns the head.
     """
     armature = bpy.data.objects.new("Body", bpy.data.armatures.new("Body"))
     bpy.context.scene.collection.objects.link(armature)

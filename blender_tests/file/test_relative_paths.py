@@ -18,7 +18,7 @@ MARKS = """{"format": "risorius landmarks", "version": 1,
 
 
 def _library(folder, name):
-    """A folder with one expression file."""
+    """Make a folder with one expression file for the expression `name`."""
     folder.mkdir()
     expression = risorius.expressions.Expression(name, name, "own", "", {JAW: 0.5}, ())
     text = risorius.expressions.text_of(expression)
@@ -32,9 +32,11 @@ OF_HEADS = (
 
 
 def _calls(folder):
-    """Operator -> [(arguments with `//` paths, file that it must write in the folder, or "")].
+    """Write the files that the operators read, and list the calls of the operators.
 
-    For `speak`, the value is the arguments only.
+    Returns:
+        Operator -> list of (arguments with `//` paths, file that the call must write in `folder`,
+        or "" if it writes none). For `speak`, the value is only the arguments.
     """
     risorius.Clip([JAW], [[0.0, 0.5]], 24.0).save(folder / "take.rzc")
     opened = 0.8 * (np.arange(240) % 60 < 20)
@@ -89,7 +91,10 @@ def _head():
 
 
 def _deaf(monkeypatch):
-    """Replace the recogniser; returns a list that receives the paths given to it."""
+    """Replace the speech recogniser by one that fails.
+
+    Returns a list that receives the path of each sound file that the recogniser should read.
+    """
     heard = []
 
     class Task:

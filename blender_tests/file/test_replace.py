@@ -30,9 +30,9 @@ def _report(name="Small"):
 
 
 def _right(rig, path, seed=5):
-    """Check that random sliders give the pose of the new file, and that no driver is broken.
+    """Check that a face shows the poses of the DNA file `path`, and that no driver is broken.
 
-    The sliders of the gaze keep their values.
+    The sliders get random values, except those of the gaze, which keep their values.
     """
     bone = scene.face(rig)
     random = np.random.default_rng(seed)
@@ -79,7 +79,7 @@ def test_a_file_with_other_numbers_everywhere(mode, dna_file, other_file):
 
 
 def _clear_action(controls):
-    """Remove the action, because keyed controls could not be set by `_right`."""
+    """Remove the action of the controls, because `_right` cannot set sliders that have keys."""
     assert controls.animation_data.action is not None
     controls.animation_data.action = None
 
@@ -138,7 +138,7 @@ def test_actions_nla_and_drivers_move_the_new_face(mode, dna_file, other_file):
 
 
 def _decorate(rig):
-    """Add many kinds of data that a user may add to a character. Returns the head."""
+    """Add many kinds of data that a user may add to a character. Returns the head mesh object."""
     head = scene.meshes(rig)[0]
     head.modifiers.new("Subdivision", "SUBSURF").levels = 0
     head.modifiers.new("First", "SMOOTH").factor = 0.0
@@ -212,7 +212,10 @@ def test_what_users_add_stays(mode, dna_file, other_file):
 
 
 def test_a_face_with_other_topology(mode, dna_file, tmp_path):
-    """The new mesh is finer; the user's data move to new vertices near their old places."""
+    """After a replacement by a file with a finer head mesh, the user's data are still there.
+
+    They move to new vertices near their old places.
+    """
     path = _save(small_face(head_grid=(19, 21)), tmp_path)
     rig = scene.load(dna_file, mode)
     head = _decorate(rig)
@@ -261,7 +264,10 @@ def test_an_untouched_mesh_leaves_no_copy(mode, dna_file, tmp_path):
 
 
 def test_edits_lie_on_top_of_the_new_file(dna_file, tmp_path):
-    """The user's offsets of a shape key and of the basis are added to the new file's vertices."""
+    """Edits of the user stay after a replacement: their offsets are added to the new vertices.
+
+    The user has edited a shape key and the basis.
+    """
     dna = other_face()
     dna.meshes[0].positions = dna.meshes[0].positions * np.float32(1.02)
     for target in dna.meshes[0].blend_shape_targets:
@@ -795,7 +801,7 @@ def test_maps_of_materials_follow_names(tmp_path):
 
 
 def test_there_and_back_again_is_where_it_was(dna_file, other_file):
-    """Edits of parts of both files survive a replacement and its reversal."""
+    """Edits of parts that both files have survive a replacement by another file and back."""
     rig = scene.load(dna_file, "KEYS")
     head = _decorate(rig)
     _keys(rig)["pull_l"].points[5].co.x += 0.01

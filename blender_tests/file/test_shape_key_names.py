@@ -14,7 +14,7 @@ PREFIX = "CTRL_expressions."
 
 @pytest.fixture
 def head():
-    """An egg-shaped head; no vocabulary knows the names of two of its shape keys."""
+    """An egg-shaped head whose shape keys Key 7 and Key 8 have names that no vocabulary knows."""
     item = egg.egg()
     keys = item.data.shape_keys.key_blocks
     keys["jawOpen"].name, keys["mouthSmileLeft"].name = "Key 7", "Key 8"
@@ -115,9 +115,10 @@ def test_what_is_said_is_undone(head):
 
 
 def test_a_picture_shows_where_a_key_moves_the_head(head):
-    """The picture of a shape key colours moved vertices, whatever the head's orientation.
+    """The picture of a shape key colours the vertices that the key moves, in a front view.
 
-    A picture of the sample man shows the expression to which the key is assigned.
+    The view is from the front, whatever the rotation of the head. A second picture shows the
+    assigned control on the sample man.
     """
     _SAY(becomes="jawOpen")
     shown = scene.submodule("scene.shape_keys.pictures")

@@ -25,7 +25,8 @@ behavior, pose_oracle = (importlib.import_module(n) for n in ("oracle_behavior",
 
 NECK, HEAD = (0, 1), 2
 JAW = "CTRL_expressions.jawOpen"
-# Frame -> jaw, and rotations of neck and head as Euler angles of their control bones, in radians.
+# Frame -> (value of the jaw slider, Euler angles of the neck's control bone, Euler angles of the
+# head's control bone); angles in radians.
 KEYS = {
     1: (0.0, (0.1, 0.0, -0.05), (-0.2, 0.1, 0.1)),
     2: (0.6, (-0.25, 0.2, 0.1), (0.35, -0.2, 0.15)),
@@ -36,7 +37,7 @@ NEAR = 2e-5  # tolerance of vertices, as a share of the head's size: bones are f
 
 
 def two_necks():
-    """The face with neck poses and a neck of two joints; the solver reads the lower joint."""
+    """The Dna of `neck_face` with two neck joints; its RBF solver reads the lower one."""
     dna = neck_face()
     dna.joint_names = ["neck_01", "neck_02", *dna.joint_names[2:]]
     return dna
@@ -45,7 +46,8 @@ def two_necks():
 class _Reference:
     """The expected face at the frames of KEYS, computed from the description of the DNA format.
 
-    It gives values of the blend shape channels, and vertices in the face's own space.
+    The reference gives values of the blend shape channels, and vertices in the space of the face's
+    armature.
     """
 
     def __init__(self, dna, rig):
@@ -61,7 +63,7 @@ class _Reference:
         return {f: rest @ q @ rest.inverted() for f, q in own.items()}
 
     def matrices(self, frame):
-        """Joint -> the matrix of its rotation about its own axes."""
+        """Index of a joint -> its rotation from rest about its own axes, float64[3, 3]."""
         half = Quaternion().slerp(self.turns["neck"][frame], 0.5)
         basis = oracle.to_blender(self.dna, np.eye(3)) * 100.0
         rest = oracle._world(self.dna, np.zeros((len(self.dna.joint_names), 9)))
@@ -96,7 +98,7 @@ class _Reference:
 
 @pytest.fixture
 def face(tmp_path):
-    """An animated face with a mirrored parent: (rig, file, _Reference)."""
+    """An animated face whose parent object is mirrored: (rig, path of the DNA file, _Reference)."""
     path, dna = tmp_path / "neck.dna", two_necks()
     dna.save(str(path))
     rig = scene.load(path)
@@ -117,7 +119,14 @@ def face(tmp_path):
 
 
 def _check(shown, reference, frame, place):
-    """Check vertices by mesh against the reference, with the face's world matrix `place`."""
+    """Compare the vertices of a face with the reference.
+
+    Args:
+        shown: index of a mesh -> its vertices in world space, float64[V, 3].
+        reference: the expected face.
+        frame: a frame of KEYS.
+        place: world matrix of the face, float64[4, 4].
+    """
     for mesh, points in shown.items():
         wanted = reference.vertices(frame, mesh) @ place[:3, :3].T + place[:3, 3]
         assert np.abs(points - wanted).max() < NEAR * np.ptp(wanted, axis=0).max(), (frame, mesh)
@@ -172,7 +181,8 @@ def _clips(rig, path, reference, wanted, folder):
     with np.load(out) as found:
         for frame in KEYS:
             np.testing.assert_allclose(found["blend_shapes"][frame - 1], wanted[frame], atol=SAME)
-    # The angles of neck and head without the raw controls give the same result.
+    # A clip with only the jaw and the angles of neck and head, without raw controls of joint
+    # rotations, gives the same channels.
     loaded = risorius.Clip.load(clip)
     angles = [f"{bone}.{way}" for bone in ("neck", "head") for way in ("yaw", "pitch", "roll")]
     loaded.selected([JAW, *angles]).save(clip)

@@ -22,7 +22,10 @@ def mode(request):
 
 
 def _set_up(motion_blur, persistent):
-    """Set up a scene that renders the face with a few samples, which are always the same."""
+    """Set up the scene to render the face with Cycles: camera, sun, and 4 samples per pixel.
+
+    The seed is fixed, so that each render uses the same samples.
+    """
     setup = bpy.context.scene
     setup.render.engine = "CYCLES"
     setup.cycles.samples, setup.cycles.device, setup.cycles.seed = 4, "CPU", 3
@@ -58,7 +61,7 @@ def _render_animation(setup, folder):
 
 
 def _render_frame(setup, folder, frame, before=None):
-    """Render a frame; if `before` is given, that frame is shown first. Returns the pixels."""
+    """Render a frame, after showing the frame `before` if it is given. Returns the pixels."""
     if before is not None:
         setup.frame_set(before)
     setup.frame_set(frame)
@@ -68,12 +71,12 @@ def _render_frame(setup, folder, frame, before=None):
 
 
 def _look_the_same(setup, folder, orders=ORDERS):
-    """Check that frames look the same in two animations and alone, after other frames.
+    """Check that frames have the same pixels in two rendered animations and in single renders.
 
     Args:
         setup: scene to render.
         folder: folder of the pictures.
-        orders: (frame, the frame that is shown before it, or None).
+        orders: single renders: (frame, the frame that is shown before the render, or None).
 
     Returns: frame -> pixels in the first animation.
     """
@@ -124,7 +127,8 @@ def test_direct_and_live_render_the_same_pixels(motion_blur, dna_file, tmp_path)
     bpy.ops.risorius.set_shape_mode(mode="LIVE")
     live = _render_animation(setup, tmp_path)
     assert not any("risorius_finished" in item for item in scene.meshes(rig).values())
-    # Vertices differ in the last bits, so a few rays hit the other side of an edge.
+    # The vertices of the two modes differ in their last bits, so a few camera rays hit another
+    # polygon at an edge.
     for frame in FRAMES:
         apart = np.abs(direct[frame] - live[frame]).max(axis=2)
         assert (apart > NOISELESS).mean() < 0.002, frame
@@ -148,7 +152,7 @@ def test_two_processes_render_the_same_pixels(mode, dna_file, tmp_path):
 )
 @pytest.mark.parametrize("motion_blur", [False, True], ids=["sharp", "blurred"])
 def test_a_frame_has_the_same_pixels_in_eevee(motion_blur, dna_file, tmp_path):
-    # The face is plain grey, because compiling materials takes long in software rendering.
+    # The face has no materials, because compiling them takes long with software rendering.
     animate(scene.load(dna_file, "LIVE", use_materials=False))
     setup = _set_up(motion_blur, False)
     setup.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT"

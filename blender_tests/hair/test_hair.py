@@ -12,7 +12,10 @@ ROWS, CARDS = 3, 5
 
 
 def cards(joint):
-    """A Mesh of hair cards in a row on a joint, each with ROWS rows of two vertices."""
+    """A Mesh with a row of hair cards that follow a joint.
+
+    Each card has ROWS rows of two vertices.
+    """
     points, faces = [], []
     for card in range(CARDS):
         for row in range(ROWS):
@@ -33,7 +36,7 @@ def cards(joint):
 
 @pytest.fixture
 def haired(tmp_path):
-    """A face with cards on the joint that its jaw control rotates, and a texture with opacity."""
+    """A face with hair cards that follow its jaw joint, and a hair texture with opacity."""
     dna = small_face()
     moving = int(dna.joint_groups[0].output_indices[0]) // 9
     meshes = {"head_lod0_mesh": dna.meshes[0], "hair_lod0_mesh": cards(moving)}
@@ -52,7 +55,8 @@ def haired(tmp_path):
 def points_of(thing):
     """Read the rendered curves.
 
-    Returns: their points in world space, float64[n, 3], and the index of each curve's first point.
+    Returns: the points of all curves in world space, float64[n, 3], and for each curve the index of
+    its first point.
     """
     thing.hide_viewport = False
     graph = bpy.context.evaluated_depsgraph_get()
@@ -77,8 +81,9 @@ def test_cards_are_seen_through_where_the_picture_says_so(haired):
     assert not bare.inputs["Alpha"].is_linked
 
 
-# How far strands may leave their cards: ASIDE in widths of a card, ALONG in rows of a card (2 cm).
-# APART is the additional distance of the tips of strands in any direction, in metres.
+# Largest distances of strands from the edges of their cards: ASIDE across the card, as a share of
+# its width; ALONG it, as a share of the distance of its rows (2 cm). At their tips, strands may be
+# further away by APART metres in any direction.
 ASIDE, ALONG, APART = 0.45, 0.005 / 0.02, 0.0015 * 3**0.5
 
 
@@ -122,10 +127,12 @@ def test_roots_stand_between_the_cards_too(haired):
     roots = points[first] - corners[0, 0, 0]
     across, along = corners[0, 0, 1] - corners[0, 0, 0], corners[0, 1, 0] - corners[0, 0, 0]
     side = np.sort(roots @ across / (across @ across))
-    # Strands use the texture's colour at transparent places between hairs, too.
+    # Strands may be at transparent places of the texture. The image must keep its colour there,
+    # so its alpha mode is channel packed.
     pictures = {n.image for n in item.data.materials[0].node_tree.nodes if n.type == "TEX_IMAGE"}
     assert [picture.alpha_mode for picture in pictures] == ["CHANNEL_PACKED"]
-    # The gaps between cards are a quarter of a card wide; roots fill these gaps too.
+    # The gaps between cards are a quarter of a card wide, and roots fill these gaps, too: no two
+    # neighbouring roots are 0.2 card widths or more apart.
     assert np.diff(side).max() < 0.2
     assert np.ptp(roots @ along / (along @ along)) > 0.3
 
@@ -134,7 +141,7 @@ _DARK = 0.1  # stored red, green and blue, as in textures of brows
 
 
 def test_strands_of_brows_are_no_black_wires(tmp_path):
-    """Strands are about as light as the cards that they replace, and their roots are thin."""
+    """The strands of brows are about as light as the brows' cards, and thin at their roots."""
     dna = small_face()
     looks.set_meshes(dna, {"head_lod0_mesh": dna.meshes[0], "brows_lod0_mesh": cards(0)})
     dna.metadata = {
@@ -166,7 +173,10 @@ RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm, mm, strands per lock, locks p
 
 @pytest.fixture
 def curly(tmp_path):
-    """Returns a function that makes a face with cards whose metadata ask for coiled hair."""
+    """A function that imports a face with cards of coiled hair.
+
+    Its argument is the coil in the DNA file's metadata, such as "radius=2 pitch=5".
+    """
 
     def made(words):
         dna = small_face()
@@ -182,7 +192,11 @@ def curly(tmp_path):
 
 
 def strands_of(face):
-    """Points of a face's strands, index of each strand's first point, and corners of the cards."""
+    """Make strands of a face's hair cards.
+
+    Returns: the points of all strands, float64[n, 3]; for each strand the index of its first point;
+    the corners of the cards, float64[CARDS, ROWS, 2, 3]. All are in world space.
+    """
     corners = scene.evaluated(scene.meshes(face)[1]).reshape(CARDS, ROWS, 2, 3).astype(float)
     before = set(bpy.data.objects)
     bpy.ops.risorius.set_strands()
@@ -204,8 +218,8 @@ def test_strands_of_tight_curls_wind_about_their_way(curly):
         up = place @ along
         off = place - up[:, None] * along
         wound = up > up[0] + 2 * RADIUS / 1000
-        # The axis of a coil is nearly parallel to the straight card, so the radius is measured
-        # from the mean of the coil's points.
+        # The axis of the coil is nearly parallel to the straight card, so the radius is measured
+        # from the mean of the coil's points, after projection along the card.
         flat = off[wound] - off[wound].mean(axis=0)
         radius = np.linalg.norm(flat, axis=1) * 1000
         assert 0.5 * RADIUS < np.median(radius) < 1.5 * RADIUS

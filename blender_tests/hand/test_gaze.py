@@ -36,7 +36,8 @@ def two_eyed(path, shift=0.0):
     groups = dna.joint_groups
     eye = groups[1]
     rows = np.zeros((6, 8), np.float32)
-    # columns: left eye looks left, right, up, down; then the right eye
+    # Columns: left eye looks left, right, up, down; right eye looks left, right, up, down. Rows:
+    # attributes of the eye joints in output_indices, in degrees or file units.
     rows[0] = [
         30,
         -28,
@@ -68,10 +69,10 @@ def rig(tmp_path):
 
 
 def eye(rig, side):
-    """Centre and direction of an eye in world space, from the bone that deforms the skin."""
+    """Centre and unit direction of an eye in world space, from the deforming bone of the eye."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bone = seen.pose.bones[f"FACIAL_{side}_Eye"]
-    # The eye's direction is -y at rest.
+    # At rest the eye looks along -y of the armature.
     turn = bone.matrix.to_3x3() @ bone.bone.matrix_local.to_3x3().inverted()
     world = seen.matrix_world
     return world @ bone.matrix.translation, (
@@ -85,7 +86,12 @@ def yaw(rig, side):
 
 
 def misses(rig, point):
-    """Angle in degrees between each eye's direction and a point in world space."""
+    """For each eye, the angle between its direction and the way to a point, in degrees.
+
+    Args:
+        rig: the face.
+        point: the point in world space.
+    """
     found = []
     for side in EYES:
         centre, ahead = eye(rig, side)
@@ -103,7 +109,10 @@ def target_point(rig):
 
 
 def move_target(rig, x, y, z):
-    """Move the target along the control armature's axes by shares of its distance from the eyes."""
+    """Move the eyes' target from rest by (x, y, z) along the control armature's axes.
+
+    The unit is the distance of the target from the eyes at rest.
+    """
     bone = target(rig)
     rest = bone.bone.matrix_local.to_3x3()
     far = abs(bone.bone.head_local.y - scene.controls(rig).data.bones["eye_L"].head_local.y)
@@ -213,7 +222,10 @@ def test_an_object_that_is_not_there_is_named(rig):
 
 @pytest.fixture
 def body(rig):
-    """A body to which the face is attached: its neck and head bones start where the face's do."""
+    """A body to which the face is attached.
+
+    The neck and head bones of the body start at the places of the face's neck and head bones.
+    """
     data = bpy.data.armatures.new("body")
     body = bpy.data.objects.new("body", data)
     bpy.context.scene.collection.objects.link(body)
@@ -301,7 +313,7 @@ def blinking(tmp_path):
 
 
 def lid_keys(rig, side):
-    """Frame -> value of the keys of an eye's blink control."""
+    """Frame -> value, for the keys of the blink control of one side ("L" or "R")."""
     path = f'pose.bones["face"]["CTRL_expressions.eyeBlink{side}"]'
     found = [c for c in scene.curves(scene.controls(rig)) if c.data_path == path]
     return {round(k.co.x, 3): round(k.co.y, 4) for c in found for k in c.keyframe_points}
@@ -316,9 +328,10 @@ def test_a_blink_closes_quickly_holds_and_opens_slowly(blinking):
 
 
 def test_the_target_that_is_proposed_is_what_the_hand_chose(rig, monkeypatch):
-    """The active object is proposed; if it is the face, a selected object; else the camera.
+    """The active object is proposed as target, unless it is a part of the face.
 
-    Of several selected objects, an empty is proposed first.
+    Then a selected object is proposed, an empty before other objects, and without selected objects
+    the scene's camera.
     """
     operators = scene.submodule("ui.hand.gaze")
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -391,7 +404,10 @@ def test_a_face_without_lids_says_so(rig):
 
 
 def lidded(path):
-    """The two-eyed face with controls that close and widen an eye, which do not follow the gaze."""
+    """Save the two-eyed face with raw controls that close and widen the left eye.
+
+    Looking up or down does not move the lids of this face. Returns the path.
+    """
     two_eyed(path)
     import risorius
 

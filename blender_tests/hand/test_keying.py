@@ -20,7 +20,7 @@ def rig(dna_file):
 
 @pytest.fixture
 def auto():
-    """Switch auto-key on at frame 10; no preference limits which keys are inserted."""
+    """Switch auto-key on at frame 10, without preferences that would suppress some keys."""
     tools, edit = bpy.context.scene.tool_settings, bpy.context.preferences.edit
     names = ("use_auto_keyframe_insert_needed", "use_keyframe_insert_needed")
     names += ("use_keyframe_insert_available", "keyframe_new_interpolation_type")
@@ -44,7 +44,7 @@ def path_of(name):
 
 
 def keys(rig, name):
-    """Frame -> value of a slider's keys."""
+    """Frame -> value, for the keys of a slider; empty without keys."""
     if (
         scene.controls(rig).animation_data is None
         or scene.controls(rig).animation_data.action is None
@@ -59,7 +59,7 @@ def curve(rig, name):
 
 
 def key(rig, name, **values):
-    """Insert keys on a slider; f5=0.3 is value 0.3 at frame 5."""
+    """Insert keys on a slider. The argument f5=0.3, for example, is the value 0.3 at frame 5."""
     for frame, number in values.items():
         scene.face(rig)[PREFIX + name] = number
         scene.controls(rig).keyframe_insert(path_of(name), frame=int(frame[1:]))
@@ -72,7 +72,7 @@ def select_keys(rig, *frames):
 
 
 def _start(rig):
-    """Pose the face asymmetrically."""
+    """Set the two corners of the mouth to different values, and open the jaw."""
     scene.set_controls(rig, mouthCornerPullL=0.8, mouthCornerPullR=0.1, jawOpen=0.5)
 
 
@@ -91,14 +91,14 @@ def _paste_blenders(rig):
 
 
 def _asset(rig, operator):
-    """Call an operator on an asset, with the properties that Blender's asset shelf would set."""
+    """Call an operator on the asset Face Joy, with the properties that an asset shelf sets."""
     bpy.ops.risorius.make_pose_assets()
     place = {"asset_library_type": "LOCAL", "relative_asset_identifier": "Action/Face Joy"}
     return operator("EXEC_DEFAULT", **place)
 
 
-# Operator that moves controls -> (call, {slider: value after the pose of `_start` and the call}).
-# None stands for any value.
+# Operator that moves controls -> (function that calls it, {slider: its value afterwards}). The
+# function is called in the pose of `_start`. The value None stands for any value.
 HANDS = {
     "risorius.reset": (lambda rig: bpy.ops.risorius.reset(), {LEFT: 0.0, RIGHT: 0.0, JAW: 0.0}),
     "risorius.mirror": (lambda rig: bpy.ops.risorius.mirror(), {LEFT: 0.1, RIGHT: 0.8}),
@@ -131,10 +131,11 @@ HANDS = {
     ),
 }
 
-# Operators that set all other sliders to rest.
+# Operators that set every slider, because they set sliders to rest that are not in the expression.
 WHOLE = [name for name in HANDS if "express" in name or "asset" in name]
 
-# Reason -> operators that move no slider and no control bone, or handle keys themselves.
+# Reason why the test of automatic keys leaves operators out -> these operators. They move no slider
+# and no control bone, or insert keys themselves.
 OTHERS = {
     "files, faces and what is shown of them": "add_character add_studio attach_body bake "
     "bake_physics bring_back describe detach_body export_animation export_dna export_web "
@@ -354,7 +355,7 @@ def test_to_the_next_key_of_a_control_and_of_all(rig):
 def _two_poses(rig):
     """Key two sliders and the head at frames 10 and 20, and show frame 14. Returns the head's bone.
 
-    A third slider, browDownL, is set without keys.
+    The third slider browDownL gets a value, but no keys.
     """
     key(rig, JAW, f10=0.2, f20=0.8)
     key(rig, LEFT, f10=0.6, f20=0.0)
@@ -428,7 +429,7 @@ def test_a_breakdown_without_keys_says_so(rig):
 
 
 def shown(rig, frame, index=0):
-    """The value of a raw control as the evaluator receives it, with layers."""
+    """The value of the raw control `index` at a frame, after layers, as the evaluator gets it."""
     bpy.context.scene.frame_set(frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seen = scene.controls(rig).evaluated_get(depsgraph)
@@ -506,7 +507,7 @@ def test_curves_of_before_get_groups_and_colours(rig):
 
 @pytest.fixture
 def preferences():
-    """The add-on's preferences, as in an installation."""
+    """The add-on's preferences, which the test adds as an installation of the add-on would."""
     addons = bpy.context.preferences.addons
     entry = addons.new()
     entry.module = scene.MODULE

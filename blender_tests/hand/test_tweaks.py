@@ -46,7 +46,7 @@ def action_of(rig):
 
 
 def below(rig):
-    """Path, place, handles and types of the keys in the face's action."""
+    """Data path, place, handles and types of all keys in the face's action, without the tweak."""
     if action_of(rig) is None:
         return []
     return [
@@ -57,7 +57,13 @@ def below(rig):
 
 
 def shown(rig, frame=None, name=JAW):
-    """The value of a raw control as the evaluator receives it, with layers."""
+    """The value of a raw control at a frame, after tweaks and layers, as the evaluator gets it.
+
+    Args:
+        rig: the face.
+        frame: the frame; None: the current frame.
+        name: short name of the raw control.
+    """
     if frame is not None:
         go(rig, frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -68,7 +74,7 @@ def shown(rig, frame=None, name=JAW):
 
 
 def press_i(rig, name=JAW, frame=20):
-    """Insert a key on a slider, as the key I and auto-key do."""
+    """Insert a keyframe on a slider, as Blender does if the user presses I over the slider."""
     scene.controls(rig).keyframe_insert(path_of(name), frame=frame)
     bpy.context.view_layer.update()
 
@@ -80,7 +86,10 @@ def ask(rig, wanted, name=JAW):
 
 
 def test_a_key_over_a_slider_goes_into_the_tweak(rig):
-    """Tested between keys, on a key, twice at a frame, and on a slider without keys."""
+    """A key that is inserted on a slider goes into the tweak.
+
+    This holds between keys, at the frame of a key, twice at a frame, and on a slider without keys.
+    """
     before, base = below(rig), {f: shown(rig, f) for f in (1, 9, 31, 40)}
     for frame, wanted in ((20, 0.8), (15, 0.5), (20, 0.7)):
         go(rig, frame)
@@ -224,7 +233,7 @@ def pose_bone(rig, name):
 
 
 def seen(rig, frame):
-    """Everything that the evaluator receives: raw controls, and rotations of head and neck."""
+    """The evaluator's inputs at a frame: raw controls, and quaternions of head and neck."""
     go(rig, frame)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     controls = scene.controls(rig).evaluated_get(depsgraph)
@@ -234,7 +243,10 @@ def seen(rig, frame):
 
 
 def turn(rig, name):
-    """Move a control bone without a key. Returns the name of the property."""
+    """Set a control bone to its value in BONES, without a key.
+
+    Returns the name of the set property, such as "location".
+    """
     bone, (channel, value) = pose_bone(rig, name), BONES[name]
     if channel == "rotation_euler":
         bone.rotation_mode = "XYZ"
@@ -245,7 +257,10 @@ def turn(rig, name):
 
 @pytest.fixture
 def turning(dna_file):
-    """A face with head keys at frames 1 and 40, a neck in Euler angles, and a tweak of 10 to 30."""
+    """A face with keys of the head at frames 1 and 40, and a tweak of frames 10 to 30.
+
+    The rotation mode of the neck is XYZ Euler.
+    """
     rig = scene.load(dna_file)
     pose_bone(rig, "neck").rotation_mode = "XYZ"
     for frame, angle in ((1, 0.1), (40, 0.3)):
@@ -258,7 +273,10 @@ def turning(dna_file):
 
 @pytest.mark.parametrize("keyed", [True, False])
 def test_bones_of_head_neck_and_eyes_go_into_the_tweak(turning, keyed):
-    """Moves go into the tweak with and without keyframes. A bake contains those with keyframes."""
+    """Motions of control bones go into the tweak, whether keyframes are inserted or not.
+
+    A bake contains the motions with keyframes.
+    """
     before, base = below(turning), {f: seen(turning, f) for f in (5, 35)}
     stood = {n: tuple(getattr(pose_bone(turning, n), BONES[n][0])) for n in BONES if n != "head"}
     go(turning, 20)
@@ -301,7 +319,11 @@ def test_a_turn_too_far_for_the_fade_is_told_and_put_back(turning):
 
 
 def test_key_all_and_whole_character_and_keys_in_channels_go_into_the_tweak(turning):
-    """A key without a move stores the current tweak."""
+    """Keys that are inserted in different ways go into the tweak.
+
+    The ways are Key All, the keying set Whole Character, and the Graph Editor. A key on a control
+    that was not moved stores the tweaked value at its frame.
+    """
     controls, before = scene.controls(turning), below(turning)
     turn(turning, "head")
     assert bpy.ops.risorius.key() == {"FINISHED"}
@@ -331,7 +353,10 @@ def test_key_all_and_whole_character_and_keys_in_channels_go_into_the_tweak(turn
 
 
 def test_pasted_keys_go_into_the_tweak_and_moved_ones_stay(rig):
-    """Each pasted key becomes a tweak at its frame."""
+    """Keys that are pasted in the Graph Editor become tweaks at their frames.
+
+    A key that is moved in the Graph Editor stays a key of the action.
+    """
     before = below(rig)
     curve = scene.curves(scene.controls(rig))[0]
     for point in curve.keyframe_points:
@@ -353,7 +378,7 @@ def test_pasted_keys_go_into_the_tweak_and_moved_ones_stay(rig):
 
 
 def test_beside_nla_strips_moves_and_keys_go_into_the_tweak(rig):
-    """Tested with a strip alone, and with an action above it."""
+    """With an NLA strip, alone or below an action, moves and keys go into the tweak."""
     controls = scene.controls(rig)
     scene.submodule("scene.animation.tweaks").end(controls)
     data = controls.animation_data
@@ -388,7 +413,10 @@ def test_beside_nla_strips_moves_and_keys_go_into_the_tweak(rig):
 
 
 def test_the_range_that_is_proposed_lies_around_the_frame(rig):
-    """A selection of all keys is not proposed as range, because an import selects all keys."""
+    """The proposed range is that of selected keys, the preview range, or frames around the current.
+
+    If all keys are selected, their range is not proposed, because an import selects all keys.
+    """
     proposed = scene.submodule("ui.hand.operators").proposed_range
     points = scene.curves(scene.controls(rig))[0].keyframe_points
     for chosen, wanted in (((1, 15, 40), (8, 32)), ((15, 40), (15, 40)), ((15,), (8, 32))):

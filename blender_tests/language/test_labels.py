@@ -16,7 +16,7 @@ STANDARD = Path(__file__).resolve().parents[2] / "tests" / "data" / "controls" /
 
 
 def texts(part):
-    """All texts that were drawn."""
+    """All texts that were drawn into a Part, also in the parts within it."""
     found = []
     for child in part.children:
         found += texts(child) if isinstance(child, Part) else [child[0]]
@@ -34,7 +34,7 @@ def rig(dna_file):
 
 @pytest.fixture(params=["", *LANGUAGES], ids=lambda language: language or "en")
 def language(request, monkeypatch):
-    """English texts, then each language with a translation table."""
+    """Let panels show English texts (""), or the texts of a language with a translation table."""
     tables, words = scene.submodule("language.tables"), ui("words")
     there = tables.translation(request.param) if request.param else {}
     for (context, english), shown in there.items():
@@ -109,7 +109,7 @@ def test_eight_levels_of_detail_have_two_rows_that_can_be_told_apart(rig, monkey
 
 
 def test_the_names_of_all_sliders_can_be_read(rig):
-    """Tests the 260 sliders of the standard face in one column."""
+    """No name of the 260 sliders of the standard face is cut off in one column of the sidebar."""
     face = {name: 0.0 for name in STANDARD.read_text().split()}
     layout, names = Part(), list(face)
     words = scene.submodule("logic.character.slider_words")
@@ -123,7 +123,10 @@ def test_the_names_of_all_sliders_can_be_read(rig):
 
 
 def test_all_sections_are_seen_at_once_on_a_laptop(rig, monkeypatch):
-    """On a screen of 1366 x 768, a new window has 688 - 84 = 604 pixels of height for the tab."""
+    """The headers of all panels fit into the tab of a new window on a screen of 1366 x 768 pixels.
+
+    The tab is 688 - 84 = 604 pixels high there.
+    """
     face, panel = scene.face(rig), ui("face.controls_panel")
     labels = [*STANDARD.read_text().split(), "spine_04.qx"]
     for name in labels:
@@ -232,7 +235,10 @@ def test_words_are_measured_for_the_width_that_the_sidebar_has():
 
 
 def test_words_are_measured_once(rig, monkeypatch):
-    """260 sliders are drawn with each redraw of the sidebar, so widths must be cached."""
+    """The width of each text is measured only once, although the panel is drawn twice.
+
+    Each redraw of the sidebar draws up to 260 sliders, so measuring again would be slow.
+    """
     words, asked = ui("words"), []
     real = words.blf.dimensions
     fake = SimpleNamespace(size=words.blf.size, dimensions=lambda *a: asked.append(a) or real(*a))

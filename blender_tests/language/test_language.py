@@ -41,7 +41,10 @@ def test_our_words_have_a_context_of_their_own(german):
 
 
 def test_properties_that_blenders_types_get_have_the_context_too():
-    """Our properties on Blender's types need the translation context, or they stay English."""
+    """Properties that the add-on adds to Blender's types have the add-on's translation context.
+
+    Without this context Blender would show their names in English.
+    """
     ours = [
         prop
         for kind in (bpy.types.Object, bpy.types.WindowManager, bpy.types.Scene)

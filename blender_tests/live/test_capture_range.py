@@ -13,7 +13,11 @@ RATE = 30
 
 
 def bump(count, at, height):
-    """A rise to `height` in 15 frames, 5 frames at it around `at`, and a fall in 15 frames."""
+    """A curve of `count` frames that rises from 0, stays at a height, and falls to 0.
+
+    It rises in 15 frames, is at `height` for 5 frames with the frame `at` in the middle, and falls
+    in 15 frames.
+    """
     distance = np.clip(np.abs(np.arange(count) - at) - 2.0, 0.0, 15.0)
     return height * (0.5 + 0.5 * np.cos(np.pi * distance / 15.0))
 
@@ -30,9 +34,9 @@ def table(path, **curves):
 
 @pytest.fixture(scope="module")
 def rom(tmp_path_factory):
-    """A take in which jaw and smiles reach their extremes.
+    """A CSV file with a capture in which a person shows the extremes of jaw and smile.
 
-    The jaw reaches 0.8, the smiles 0.7 with 0.05 at rest. A brow hardly moves.
+    The jaw goes from 0 to 0.8, the smiles from 0.05 to 0.7. A brow reaches only 0.05.
     """
     smile = 0.05 + bump(150, 110, 0.65)
     return table(
@@ -54,7 +58,7 @@ def rows(rig):
 
 
 def imported(rig, path, **options):
-    """Import a file. Returns the highest keys of jaw and smile, and the text of the report."""
+    """Import a clip. Returns the highest key values of jaw and smile, and the import report."""
     assert bpy.ops.risorius.import_animation(filepath=str(path), **options) == {"FINISHED"}
     action = scene.controls(rig).animation_data.action
     tops = {}
@@ -95,7 +99,8 @@ def test_the_range_of_a_take_alone_leaves_the_face_as_it_is(rig, tmp_path):
     jaw = sum(bump(400, at, 0.75) for at in (60, 160, 260, 340))
     smile = bump(400, 200, 0.7)
     take = table(tmp_path / "take.csv", JawOpen=jaw, MouthSmileLeft=smile, MouthSmileRight=smile)
-    # The jaw stops repeatedly at the same height; a single smile shows no extreme.
+    # The jaw reaches the same height four times, so this is its extreme and becomes 1. The smile
+    # reaches its height only once, which shows no extreme, so it stays unchanged.
     assert imported(rig, take, capture_range="TAKE")[:2] == pytest.approx((1.0, 0.7))
     assert rows(rig) == {}
     short = table(tmp_path / "short.csv", JawOpen=[0.0, 1.0])
@@ -164,7 +169,8 @@ def test_live_capture_follows_the_range_and_teaches_it(rig, rom):
     assert jaw.keyframe_points[1].co[1] == 1.0
     with pytest.raises(RuntimeError, match="a take of at least 2 s was expected"):
         bpy.ops.risorius.learn_range_live()
-    # Learning uses the received values, before they are rescaled by the earlier range.
+    # A new range is learned from the received values, not from the values that the present range
+    # has stretched.
     session, frame = session_of(rig), session_of(rig).recent[-1]
     session.recent.clear()
     for n, height in enumerate(bump(150, 60, 0.65)):

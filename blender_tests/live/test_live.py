@@ -56,7 +56,7 @@ def packet(frame, subject="iPhone", rate=60, **places):
 
 
 def send(port, *steps):
-    """Run the sender program with these steps and wait for its end."""
+    """Run the program that sends packets to the port, with these steps, and wait for its end."""
     lines = "".join(json.dumps(step) + "\n" for step in steps)
     command = [sys.executable, str(SENDER), str(port)]
     limits.run(command, 60, input=lines).check_returncode()
@@ -67,7 +67,10 @@ def session_of(rig):
 
 
 def tick_until(rig, frames):
-    """Wait until this number of frames of the subject has arrived, then run the timer once."""
+    """Wait until this number of frames of the captured person has arrived, then apply the newest.
+
+    The frame is applied by one call of the function that Blender's timer calls.
+    """
     module, ends = scene.submodule("scene.live.capture"), monotonic() + 20.0
     session = session_of(rig)
     while True:
@@ -194,7 +197,8 @@ def test_a_recording_is_an_action(dna_file, port):
     keys = np.array([tuple(k.co) for k in jaw.keyframe_points])
     assert np.allclose(keys[:, 0], [11 + n / 60 * 24 for n in numbers], atol=1e-4)
     assert np.allclose(keys[:, 1], [n / 16.0 for n in numbers], atol=1e-7)
-    # At whole frames, played values are interpolated between the values of received faces.
+    # The faces were received between whole frames of the scene. At whole frames the action gives
+    # interpolated values.
     for frame in (11, 13, 15):
         bpy.context.scene.frame_set(frame)
         at = np.interp((frame - 11) / 24 * 60, numbers, np.array(numbers) / 16.0)
@@ -280,7 +284,7 @@ def test_vmc_and_neutral_now(dna_file, port):
 
 
 def listens(port):
-    """Whether the port is in use."""
+    """Whether a program uses this UDP port of the computer."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("127.0.0.1", port))
@@ -331,7 +335,7 @@ def sliders(rig):
 
 
 def begin_recording(rig, *steps):
-    """Start a capture and a recording, and send the steps."""
+    """Start a live capture and a recording, and send these packets to it."""
     assert bpy.ops.risorius.live_start() == {"FINISHED"}
     assert bpy.ops.risorius.live_record() == {"FINISHED"}
     send(bpy.context.window_manager.risorius_live.port, *steps)
@@ -459,7 +463,7 @@ def test_undo_does_not_end_it(dna_file, port):
 
 
 def drawn():
-    """The texts of the panel in its current state."""
+    """The texts that the panel Live Capture draws now, joined by " | "."""
     return layout.drawn(scene.submodule("ui.live.panel").RISORIUS_PT_live).text(" | ")
 
 

@@ -25,7 +25,7 @@ def _materials(rig):
 
 
 def _shown(material):
-    """The socket for the colour of a material, or for the roughness of a clear film."""
+    """The input socket of a material's base colour; for a clear film, of its roughness."""
     shader = looks.principled(material)
     if shader is not None:
         return shader.inputs["Base Color"]
@@ -50,7 +50,10 @@ def kinds_file(tmp_path):
 
 @pytest.mark.parametrize("kind", ["teeth", "tongue", "gums"])
 def test_what_lies_deep_in_a_mouth_is_dark_without_shadows(tmp_path, kind):
-    """Without this darkening, molars look like a white wall behind the corner of an open mouth."""
+    """Materials of the mouth are darker deep in the mouth, without any shadows.
+
+    Otherwise molars would look like a white wall behind the corner of an open mouth.
+    """
     face = small_face()
     mesh = looks.copy_mesh(face.meshes[1], scale=2.0)
     points = mesh.positions.copy()
@@ -87,9 +90,10 @@ def test_no_kind_of_mesh_is_flat(kinds_file, tmp_path, simple):
 
 
 def test_threads_of_cloth_are_gone_where_they_would_be_grains(tmp_path):
-    """The height of the weave is rendered as light.
+    """The weave of cloth is visible from 30 cm, and flat from 3 m.
 
-    The weave is visible from 30 cm. From 3 m, where a thread is smaller than a pixel, it is flat.
+    From 3 m a thread is smaller than a pixel, so a weave would look like noise. The test renders
+    the height of the weave as light.
     """
     face = small_face()
     skin = face.meshes[0]
@@ -119,13 +123,15 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
     for factor in (1.0, 3.0):
         bpy.context.scene.unit_settings.scale_length = 1.0 / factor
         shader = looks.principled(_materials(scene.load(_save(tmp_path, small_face())))["head"])
-        # The weight depends on the distance from an open border.
+        # A node tree sets the scattering weight, because it depends on the distance from an open
+        # border of the mesh.
         assert shader.inputs["Subsurface Weight"].is_linked
-        # Scattering distance of light in the palest skin, in Blender units; dark skin has less.
+        # The node that scales the scattering distance; its second input is the distance in the
+        # palest skin, in Blender units. Darker skin has a smaller distance.
         far = shader.inputs["Subsurface Scale"].links[0].from_node
         scales.append(far.inputs[1].default_value)
     assert scales[1] == pytest.approx(3 * scales[0], rel=1e-4)
-    # A head of 19 cm scatters red light over some millimetres.
+    # In a head that is 19 cm high, light is scattered over some millimetres.
     assert 0.001 < scales[0] < 0.006
 
 
@@ -133,9 +139,9 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
 
 
 def _mapped(label, metadata=None):
-    """A face whose second animated map has this name, and gets half the value of browDownL.
+    """The Dna of a face whose second animated map has the name `label`.
 
-    browDownL drives no other map and no bone.
+    The map gets half the value of browDownL, which drives no other map and no bone.
     """
     center = np.array([0.0, 158.0, 2.0])
     head = fine_mesh(np.random.default_rng(1), (40, 44), 10.0, center, (1, 2), ())
@@ -146,9 +152,10 @@ def _mapped(label, metadata=None):
 
 
 def _before_and_after(rig, tmp_path):
-    """Render without and with the map.
+    """Render the head with browDownL at 0 and at 1, which activates the animated map.
 
-    Returns: change of each pixel, (x, z) of each pixel, whether the head covers the pixel.
+    Returns for each pixel: its largest change in a colour channel, the (x, z) that it shows in
+    Blender units, and whether the head covers it.
     """
     head = scene.meshes(rig)[0]
     for index, item in scene.meshes(rig).items():
@@ -179,8 +186,8 @@ def test_a_map_without_textures_shows_in_its_area_only(tmp_path, label, side):
     points = np.array([v.co for v in scene.meshes(rig)[0].data.vertices])
     unit = 0.36 * np.ptp(points[:, 0])
     top = points[:, 2].max() - 1.75 * unit
-    # Distance from the middle of the area between the brows; 1 at the edge of its ellipse, which
-    # animated_maps and skin_folds call glabella.
+    # Distance of each pixel from the middle of the glabella, the area between the brows. The
+    # distance is 1 at the edge of the ellipse that bounds the area.
     away = np.hypot(x / 0.26, (z - top - 0.36 * unit) / 0.32) / unit
     inside = solid & (away < 0.8) & (side * x > 0.05 * unit)
     outside = solid & ((away > 1.5) | (side * x < -0.2 * unit))
@@ -198,21 +205,22 @@ def test_a_mask_of_the_metadata_limits_its_map(tmp_path):
     rig = scene.load(path)
     changed, (x, _), solid = _before_and_after(rig, tmp_path)
     width = np.ptp(x[solid])
-    # u grows with x here; the file's +x is the face's left and Blender's +x.
+    # The mask is 1 in its left half. On this mesh u grows with x, so this is the half with low x.
     assert changed[solid & (x < -0.15 * width)].mean() > 6 / 255
     assert changed[solid & (x > 0.15 * width)].max() <= 2 / 255
 
 
-# Colours of the left and right half of a wrinkle map: complete normals or colours in WHOLE,
-# differences around 0.5 in OFFSETS.
+# Pairs of RGB colours for the left and the right half of a wrinkle map. WHOLE are complete normals
+# or colours; OFFSETS are differences from the base map, in which 0.5 means no difference.
 WHOLE = ((0.85, 0.5, 0.85), (0.85, 0.5, 0.85))
 OFFSETS = ((0.9, 0.5, 0.5), (0.1, 0.5, 0.5))
 
 
 def _write_maps(folder, wrinkle, mask_left):
-    """Write base and wrinkle maps with MetaHuman's names, and a mask for half of the face.
+    """Write base and wrinkle maps with MetaHuman's file names, and a mask of the wrinkle map.
 
-    The mask's red channel is 1 in the left half of the image if `mask_left`, else in the right.
+    The red channel of the mask is 1 in the left half of the image if `mask_left` is True, else in
+    the right half.
     """
     folder.mkdir()
     looks.write_image(folder / "head_color_map.png", np.full((16, 16, 3), 0.6, np.float32))
@@ -242,7 +250,10 @@ def test_wrinkle_textures_show_where_their_mask_is(tmp_path, target, wrinkle):
 
 @pytest.mark.parametrize("target", ["normal", "color"])
 def test_differences_of_nothing_change_nothing(tmp_path, target):
-    """Newer exports store differences around 0.5, so grey must not become the target colour."""
+    """A wrinkle map of the value 0.5, which means no difference, does not change the face.
+
+    Newer MetaHuman exports store differences from the base map, so grey is no colour to blend to.
+    """
     letter = "w" if target == "normal" else "c"
     path = _save(tmp_path, _mapped(f"head_{letter}m1_{target}.head_wm1_blink_L"))
     _write_maps(tmp_path / "Maps", WHOLE, mask_left=True)
@@ -288,7 +299,11 @@ def test_simple_materials_have_no_drivers_and_no_subsurface(kinds_file):
 
 
 def _eye_under_a_film(film="eyeshell"):
-    """An eye with a film in front, such as eyeshell or cornea."""
+    """The Dna of a face with an eye and a clear mesh in front of the eye.
+
+    Args:
+        film: name of the clear mesh, "eyeshell" or "cornea".
+    """
     face = small_face()
     patch = face.meshes[1]
     meshes = {
@@ -332,7 +347,8 @@ def test_a_cornea_refracts_for_cycles_alone(tmp_path):
 
     assert "BSDF_REFRACTION" in shaders(outputs["CYCLES"])
     assert "BSDF_REFRACTION" not in shaders(outputs["ALL"])
-    # Light and shadows pass; only camera rays are refracted.
+    # The material of Cycles chooses by the kind of ray: it refracts camera rays, and lets light
+    # pass unchanged.
     assert "LIGHT_PATH" in shaders(outputs["CYCLES"])
     assert "BSDF_TRANSPARENT" in shaders(outputs["CYCLES"])
 
@@ -500,9 +516,10 @@ for image in bpy.data.images:
 
 @pytest.mark.parametrize("data", ["Utility - Raw", "ACES - Linear"])
 def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
-    """Colour configurations like ACES have no `sRGB` and `Non-Color`.
+    """Textures get the right colour spaces in configurations without `sRGB` and `Non-Color`.
 
-    In one of them, the role `data` is a colour space that is not for data.
+    Such a configuration is ACES. In one of the two tested configurations, the role `data` is a
+    colour space that is not for data.
     """
     path = _save(tmp_path, _mapped("head_wm1_normal.head_wm1_blink_L"))
     _write_maps(tmp_path / "Maps", WHOLE, mask_left=True)
@@ -514,13 +531,14 @@ def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
     spaces = {w[1]: (w[2], " ".join(w[3:])) for w in map(str.split, said.splitlines())
               if w[:1] == ["SPACE"]}  # fmt: skip
     for name in ("head_normal_map.png", "head_wm1_normal_map.png"):
-        # Blender sets `is_data` by the role only, so with the wrong role only the name counts.
+        # Blender sets `is_data` by the role `data` only. If this role is wrong, `is_data` is False,
+        # and the add-on must have chosen the space by its name.
         assert spaces[name] == (str(data == "Utility - Raw"), "Utility - Raw"), said
     assert spaces["head_color_map.png"] == ("False", "Utility - sRGB - Texture"), said
 
 
 class _Spaces:
-    """Settings of an image in a colour configuration with unknown names."""
+    """Stands for the colour settings of an image, in a configuration with unknown space names."""
 
     bl_rna = SimpleNamespace(
         properties={"name": SimpleNamespace(enum_items=[SimpleNamespace(identifier="Vectors")])}
@@ -545,14 +563,17 @@ def test_where_no_name_is_known_the_configuration_itself_says_what_numbers_are(d
 
 
 def test_head_and_body_have_the_same_normals_at_the_seam(tmp_path):
-    """A sphere is cut in two. Without the DNA file's normals, each half shows a seam at its rim."""
+    """Head and body have equal normals at their seam, if the DNA file's normals are used.
+
+    The meshes are two parts of a sphere. Without the normals of the DNA file, the seam is visible.
+    """
     face = small_face()
     center = np.array([0.0, 158.0, 2.0])
     whole = fine_mesh(np.random.default_rng(1), (40, 44), 10.0, center, (1, 2), ())
     faces = whole.face_layouts.reshape(-1, 4)
     level = whole.positions[faces, 1].mean(axis=1)
     upper = level >= np.median(level)
-    # The weights change smoothly from one joint to the next, as at a real neck.
+    # The skin weights change smoothly with the height from one joint to the other, as at a neck.
     height = whole.positions[:, 1]
     share = (height - height.min()) / np.ptp(height)
     parts = {}
@@ -576,13 +597,13 @@ def test_head_and_body_have_the_same_normals_at_the_seam(tmp_path):
             scene.update(scene.controls(rig))
             ours, theirs = (_corner_normals(m) for _, m in sorted(scene.meshes(rig).items()))
             gap = max(np.abs(ours[v] - theirs[v]).max() for v in seam)
-            # In a pose Blender rotates custom normals by each half's own shape, so they are nearly
-            # equal.
+            # In a pose, Blender rotates the custom normals of each mesh by the mesh's own shape, so
+            # the normals of the two meshes at the seam are only nearly equal.
             assert (gap < (0.03 if turn else 2e-3)) == normals, (turn, gap)
 
 
 def _corner_normals(item):
-    """Vertex -> mean corner normal of the evaluated mesh."""
+    """Index of a vertex -> mean of its corner normals in the evaluated mesh, float64[3]."""
     seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = seen.to_mesh()
     found = {}
@@ -593,9 +614,9 @@ def _corner_normals(item):
 
 
 def test_map_drivers_are_plain_sums(tmp_path):
-    """Drivers of animated maps are sums without Python expressions.
+    """The drivers of animated maps in a material are of the type Sum Values.
 
-    scene/material/skin_material.py makes them.
+    So they need no Python expressions. scene/material/skin_material.py makes these drivers.
     """
     rig = scene.load(_save(tmp_path, _mapped("head_wm2_normal.head_wm2_browsDown_L")))
     drivers = list(scene.submodule("scene.material.materials").map_drivers(_materials(rig)["head"]))

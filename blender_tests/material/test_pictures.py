@@ -51,7 +51,12 @@ def test_damaged_heads_have_a_size_or_none(file_format, tmp_path):
 
 
 def _bomb(width, height, rows=40):
-    """A PNG whose header states a size that its data do not have."""
+    """The bytes of a PNG whose header states a larger size than its pixel data have.
+
+    Args:
+        width, height: size in pixels in the header.
+        rows: number of rows of pixel data, at most 64.
+    """
 
     def chunk(kind, content):
         crc = zlib.crc32(kind + content)
@@ -91,7 +96,7 @@ def test_a_small_file_of_a_huge_picture_is_a_sentence(tmp_path):
 
 
 def _most_memory():
-    """The largest address space that this process has used, in bytes."""
+    """The largest virtual memory (VmPeak) that this process has had, in bytes."""
     lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     return int(next(line for line in lines if line.startswith("VmPeak")).split()[1]) * 1024
 
@@ -128,7 +133,10 @@ def test_many_pictures_have_a_bound_together(tmp_path, monkeypatch):
 
 
 def test_a_large_flat_picture_is_taken(tmp_path):
-    """A mask with 8192 pixels per side may have a file a thousand times smaller than its pixels."""
+    """A picture of 8192 x 8192 pixels is accepted, although its file is a thousand times smaller.
+
+    A mask with few colours, for example, has such a file. A larger picture is refused.
+    """
     textures = scene.submodule("scene.material.image_loading")
     path = tmp_path / "flat.png"
     path.write_bytes(_bomb(8192, 8192))

@@ -15,8 +15,8 @@ HAIR, THIN = (0.5, 0.4, 0.4), 0.15  # colour of brows, and the share of their ca
 def _face(tmp_path, color=True):
     """Save a face for the solid view: a head with a mask, teeth, and a fine eye.
 
-    Lashes, a film and brows are in front of the eye. If `color`, the head has a colour texture and
-    the brows have one of thin hair. Returns: the path of the file.
+    Lashes, a clear film and brows are in front of the eye. If `color` is True, the head has a
+    colour texture, and the brows have a texture of thin hair. Returns the path of the file.
     """
     face = small_face()
     random = np.random.default_rng(5)
@@ -64,7 +64,8 @@ def test_the_iris_has_a_slot_of_the_same_surface(tmp_path):
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = np.ptp(points[:, 2]) / 2
     away = np.hypot(*(middles - middle)[:, [0, 2]].T) / radius
-    # The iris has the same edge as in the shader, within half a polygon.
+    # Polygons nearer to the middle than the edge of the iris have the slot of the iris. The edge
+    # is the one of the shader; the tolerance is half a polygon.
     assert (slots[away < 0.43] == 1).all()
     assert (slots[away > 0.51] == 0).all()
     assert max(iris.diffuse_color[:3]) < 0.1

@@ -8,8 +8,8 @@ import pytest
 from support import scene
 from support.layout import Recorder
 
-# Operators that the menu lacks, because they need an item of a panel, list or handle, or belong to
-# an open dialog.
+# Operators that the menu Face does not contain, because they act on an item of a panel or list or
+# on a handle, or belong to an open dialog.
 ELSEWHERE = {
     *("apply_pose_asset", "blend_pose_asset", "blend_expression", "delete_expression"),
     *("rename_expression", "star_expression", "update_expression", "render_thumbnails"),
@@ -34,7 +34,7 @@ ELSEWHERE = {
 
 
 class Menus(Recorder):
-    """Follows submenus like Blender's search."""
+    """A fake layout that collects the entries of a menu and of its submenus, as the search does."""
 
     def __init__(self, top=None):
         super().__init__(top)
@@ -61,7 +61,10 @@ class Menus(Recorder):
 
 
 def found():
-    """The entries of the menu: their paths as the search shows them, and names of operators."""
+    """The entries of the menu Face.
+
+    Returns their paths as Blender's search shows them, and the set of their operators' names.
+    """
     layout = Menus()
     draw = scene.submodule("ui.menu.face_menu").draw_header
     assert draw in bpy.types.VIEW3D_MT_editor_menus._dyn_ui_initialize()
@@ -70,7 +73,7 @@ def found():
 
 
 def is_in_header():
-    """Whether the header shows the menu."""
+    """Whether the header of 3D views shows the menu Face."""
     return bool(found()[0])
 
 

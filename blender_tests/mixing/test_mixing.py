@@ -13,13 +13,17 @@ MEDIUM = Path(__file__).parents[2] / "tests" / "data" / "golden" / "medium.dna"
 
 
 def to_blender(points):
-    """Convert centimetres with y up to metres with z up."""
+    """Convert points from centimetres with y up to metres with z up, float64[N, 3]."""
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1) * 0.01
 
 
 @pytest.fixture
 def files(tmp_path):
-    """A folder with a face, a wider and deeper copy, and a copy of this with a renamed joint."""
+    """A folder with three DNA files.
+
+    one.dna is a face, wide.dna is the face made wider and deeper, and other.dna is wide.dna with a
+    renamed joint.
+    """
     dna = risorius.load(MEDIUM)
     dna.save(tmp_path / "one.dna")
     meshes = []
@@ -70,7 +74,7 @@ def seen(item):
 
 
 def finest(path):
-    """The vertices of the meshes of LOD 0 in Blender's space, float64[V, 3]."""
+    """The neutral vertices of a DNA file's LOD 0, in metres with z up, float64[V, 3]."""
     dna = risorius.load(path)
     rows = [np.asarray(dna.meshes[int(m)].positions) for m in dna.lod_mesh_mapping[0]]
     return to_blender(np.concatenate(rows))

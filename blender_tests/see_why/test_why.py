@@ -27,7 +27,13 @@ def why(name):
 
 
 def raw_with(rig, path, **values):
-    """Raw controls of the sliders, float32[R]. values: end of a control's name -> other value."""
+    """The raw controls that the sliders give, with some other values, float32[R].
+
+    Args:
+        rig: the face.
+        path: path of the DNA file.
+        values: end of a raw control's name -> value instead of the slider's value.
+    """
     raw = scene.raw_of(rig, path)
     names = risorius.load(str(path)).raw_control_names
     for end, value in values.items():
@@ -36,7 +42,14 @@ def raw_with(rig, path, **values):
 
 
 def wanted(path, mesh, raw, without_corrective=False):
-    """Vertices by the oracle in mm, float64[V, 3], with or without the corrective."""
+    """The vertices of a mesh by the oracle in mm, float64[V, 3].
+
+    Args:
+        path: path of the DNA file.
+        mesh: index of the mesh.
+        raw: values of the raw controls.
+        without_corrective: True: without the effect of the corrective CORRECTIVE.
+    """
     dna = risorius.load(str(path))
     pose = risorius.Rig(dna).evaluate(np.asarray(raw, np.float32))
     if without_corrective:
@@ -56,7 +69,7 @@ def apart(one, other):
 
 
 def heat_of(rig):
-    """Mesh -> colours of its heat map, float32[V, 4]."""
+    """Index of a mesh -> colours of its heat map, float32[V, 4]; without meshes that have none."""
     found = {}
     for index, item in scene.meshes(rig).items():
         layer = item.data.color_attributes.get(HEAT)

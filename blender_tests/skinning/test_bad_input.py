@@ -16,7 +16,10 @@ def _pair(dna, tmp_path):
 
 
 def test_weights_that_do_not_sum_to_one(tmp_path):
-    """The DNA file or the user may set such weights; Blender divides them by their sum."""
+    """Weights that do not sum to 1 have the same effect in both modes.
+
+    The DNA file or the user may set such weights; Blender divides them by their sum.
+    """
     dna = small_face()
     mesh = dna.meshes[0]
     weights = np.array(mesh.skin_weights)
@@ -65,7 +68,7 @@ def test_groups_of_no_bone_and_of_a_bone_that_does_not_deform(tmp_path):
 
 @pytest.mark.parametrize("scale", [(0.0, 0.0, 0.0), (1.0, 0.0, 2.0), (1e-9, 1e-9, 1e-9)])
 def test_a_bone_of_no_size(tmp_path, scale):
-    """A script scales an unmoved joint to 0 in one or all directions, or nearly to 0."""
+    """A script scales a joint that no control moves to 0 along one or all axes, or nearly to 0."""
     pair = _pair(small_face(), tmp_path)
     for rig in pair.each():
         rig.pose.bones["user_joint"].scale = scale
@@ -76,7 +79,7 @@ def test_a_bone_of_no_size(tmp_path, scale):
 
 
 def test_a_joint_that_the_file_gives_no_size(tmp_path):
-    """With an open mouth, the DNA file scales the jaw to 0."""
+    """The DNA file scales the jaw joint to 0 if the control jawOpen is 1."""
     dna = small_face()
     group = dna.joint_groups[0]
     values = np.array(group.values)
@@ -102,7 +105,7 @@ def test_a_slider_that_is_no_number(tmp_path):
 
 
 def test_an_added_and_a_renamed_bone(tmp_path):
-    """Weights belong to the current names of bones."""
+    """After bones were added or renamed, both modes use the bones' present names for weights."""
     pair = _pair(small_face(), tmp_path)
     for rig in pair.each():
         rig.hide_viewport = False

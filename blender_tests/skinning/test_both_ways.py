@@ -16,8 +16,9 @@ STAND_IN = "RISORIUS_TEST_STAND_IN"  # variable: path of a file of tests/fullsca
 MAN = ROOT / "build" / "sample" / "man.dna"
 NORMALS_NEAR = 2e-3  # tolerance of unit normals, which are computed from float positions
 
-# CASES: name -> (function that makes a Dna, or file; LODs; number of poses; scale of the object).
-# _CONVENTIONS: name of a case -> options of small_face.
+# _CONVENTIONS: name of a case -> options of small_face, for other axes, rotations and units.
+# CASES: name of a case -> (function that makes a Dna, or path of a DNA file; tested LODs; number of
+# poses; scale of the face's objects).
 _CONVENTIONS = {
     "small": {},
     "z up": {"axes": ("right", "front", "up")},
@@ -56,7 +57,10 @@ def _path(source, folder):
 
 
 def _pose(pair, random, turned):
-    """Set random sliders; if `turned`, rotate neck, head and eyes and move the eyes' control."""
+    """Set the sliders of both faces to the same random values.
+
+    If `turned` is True, neck, head and the target of the eyes are rotated, and the target is moved.
+    """
     sliders = None
     for rig in pair.each():
         face, bones = scene.face(rig), scene.controls(rig).pose.bones

@@ -20,14 +20,14 @@ def pair(dna_file):
 
 
 def _opened():
-    """The pair of faces in the current file."""
+    """The Pair of the two faces in the open .blend file."""
     pair = object.__new__(both_ways.Pair)
     pair.direct, pair.live = bpy.data.objects["Small_rig"], bpy.data.objects["Small.001_rig"]
     return pair
 
 
 def _keys(rig):
-    """Mesh -> points of all its shape keys."""
+    """Index of a mesh -> points of all its shape keys, float64[keys, V, 3]."""
     found = {}
     for number, item in scene.meshes(rig).items():
         blocks = item.data.shape_keys.key_blocks
@@ -117,7 +117,10 @@ def test_a_save_between_undo_and_the_next_update(pair, tmp_path):
 
 
 def test_a_file_that_blender_writes_by_itself(pair, tmp_path):
-    """A file of `libraries.write` has disabled modifiers; the face returns to Direct mode."""
+    """A face in a file of bpy.data.libraries.write is in Direct mode after the file is opened.
+
+    The file stores the armature modifiers as Direct mode has them: disabled.
+    """
     shown = scene.snapshot(pair.direct)
     blend = tmp_path / "copied.blend"
     bpy.data.libraries.write(str(blend), {bpy.context.scene})
@@ -246,7 +249,10 @@ def test_a_duplicated_character(pair, linked):
 
 @pytest.mark.parametrize("linked", [False, True], ids=["Shift-D", "Alt-D"])
 def test_a_duplicated_mesh(pair, linked):
-    """The rig deforms a copied mesh as in Live mode; for it the bones are posed."""
+    """A copy of the head mesh is deformed by the armature, as in Live mode.
+
+    As long as the copy exists, the bones are posed.
+    """
     made = [_duplicate([scene.meshes(rig)[0].name], linked)[0] for rig in pair.each()]
     pair.check()
     copies = [scene.evaluated(item) for item in made]

@@ -85,7 +85,7 @@ def removed(rig, head):
 
 
 def of_another(rig, head):
-    """Assign another armature to the face's armature modifier."""
+    """Let the control armature, not the deforming armature, be the object of the modifier."""
     modifier = _armature(head)
     modifier.object = rig["risorius_controls"]
 
@@ -185,7 +185,7 @@ def live_relative(_rig, head):
 
 
 def key_edited_on_live(_rig, head):
-    """Add a key of the user that is relative to the live key."""
+    """Add a shape key of the user that is relative to the live shape key."""
     block = _own_key(head)
     block.relative_key = _live_key(head)
     block.value = 0.5
@@ -201,7 +201,7 @@ def basis_edited(_rig, head):
 
 
 def moved(_rig, head):
-    """Move the head; the add-on moves it back, because parts of a face must fit."""
+    """Move the head mesh; the add-on moves it back, because the meshes of a face must fit."""
     return _set(head, "location", (0.1, 0.0, 0.2))
 
 
@@ -270,9 +270,9 @@ WHOLE_FACE = [rest_position, other_inheritance, bone_constraint]
 
 @contextmanager
 def _row(change):
-    """Add the name of the tested change to an assertion that fails.
+    """Context manager that adds the name of the tested change to the text of a failed assertion.
 
-    All changes are tested in one scene, because each is undone.
+    One test makes all changes in one scene, and undoes each change before the next one.
     """
     try:
         yield
@@ -347,7 +347,7 @@ def live_renamed(_rig, head):
 
 
 def live_moved(_rig, head):
-    """Move the live key to another place in the list of shape keys."""
+    """Move the live shape key down in the list, below a new shape key of the user."""
     _own_key(head)
     bpy.context.view_layer.objects.active = head
     head.active_shape_key_index = len(head.data.shape_keys.key_blocks) - 1
@@ -405,9 +405,10 @@ def test_an_edited_rest_form(pair):
 
 
 def test_sliders_and_frames_look_at_nothing_again(pair, monkeypatch):
-    """Plans and weights are read only after edits, because reading takes longer than a frame.
+    """Only edits make the add-on read the conditions of Direct mode and the weights again.
 
-    A moved slider causes at most a quick look.
+    Reading takes longer than a frame may take. A moved slider causes at most `look_quickly`, and a
+    new frame causes no reading.
     """
     conditions, skins = (scene.submodule(f"scene.skinning.{n}") for n in ("conditions", "skins"))
     animation.animate(pair.direct)
@@ -433,13 +434,19 @@ def _noted(function, read):
 
 
 def test_a_deleted_live_key(pair):
-    """If the live key is deleted, joints still move the mesh in Live mode, but shapes do not."""
+    """After the live shape key was deleted, both modes show the same: joints move the mesh.
+
+    The blend shape channels have no effect then.
+    """
     pair.edit(live_deleted)
     pair.check()
 
 
 def test_another_object_with_the_same_data_keeps_the_rest_form(pair):
-    """If another object shares the mesh data, the face's mesh gets a copy, as in Live mode."""
+    """If another object shares the mesh data of the face, this object shows the rest form.
+
+    The face's mesh gets a copy of the data, as in Live mode.
+    """
     others = []
 
     def share(_rig, head):
@@ -472,9 +479,12 @@ def test_a_mesh_that_is_worked_on_is_live(pair):
 
 
 def _work(rig, mode, named):
-    """Enter a mode with the head mesh and leave it.
+    """Enter a mode of Blender with the head mesh, and leave the mode.
 
-    Args: named: whether the plan must state the head as a mesh that is not in Direct mode.
+    Args:
+        rig: the face.
+        mode: the mode, such as "SCULPT".
+        named: True: the plan must say that the head mesh is not in Direct mode in this mode.
     """
     head = scene.meshes(rig)[0]
     _mode(head, mode)
@@ -492,7 +502,7 @@ def _work(rig, mode, named):
 
 
 def test_vertices_moved_in_edit_mode(pair):
-    """In edit mode, the mesh shows the basis shape key, and moved vertices are stored in it."""
+    """Vertices that are moved in edit mode are stored in the basis shape key in both modes."""
     for rig in pair.each():
         head = scene.meshes(rig)[0]
         head.active_shape_key_index = 0
@@ -553,7 +563,10 @@ def test_another_number_of_vertices(pair):
 
 
 def test_a_modifier_that_was_disabled_before_direct_mode(pair):
-    """The mode Automatic does not enable a modifier that the user disabled before."""
+    """A modifier that the user disabled before Direct mode stays disabled in Direct mode.
+
+    The mesh then is not in Direct mode, and the plan names it.
+    """
     rig, head = pair.live, scene.meshes(pair.live)[0]
     _armature(head).show_viewport = False
     both_ways.settle()

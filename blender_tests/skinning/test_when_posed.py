@@ -52,7 +52,7 @@ def constraint(rig):
 
 
 def bone_constraint_elsewhere(rig):
-    """Make a bone of another armature follow the jaw."""
+    """Make a bone of another armature follow the jaw bone by a constraint."""
     armature = bpy.data.objects.new("Other", bpy.data.armatures.new("Other"))
     bpy.context.scene.collection.objects.link(armature)
     bpy.context.view_layer.objects.active = armature
@@ -82,7 +82,7 @@ def driver(rig):
 
 
 def driver_of_a_material(rig):
-    """Make a node of the face's material read the jaw."""
+    """Add a driver that reads the jaw bone to a node of the face's material."""
     material = scene.meshes(rig)[0].material_slots[0].material
     node = material.node_tree.nodes.new("ShaderNodeValue")
     curve = node.outputs[0].driver_add("default_value")
@@ -98,7 +98,7 @@ def driver_of_a_material(rig):
 
 
 def clothes(rig):
-    """Let the rig deform another object."""
+    """Add an object with an armature modifier by which the face's armature deforms it."""
     shirt = bpy.data.objects.new("Shirt", bpy.data.meshes.new("Shirt"))
     bpy.context.scene.collection.objects.link(shirt)
     shirt.data.from_pydata([(0, 0, 1.5), (0.1, 0, 1.5), (0, 0.1, 1.4)], [], [(0, 1, 2)])
@@ -108,7 +108,7 @@ def clothes(rig):
 
 
 def nodes_with_the_rig(rig):
-    """Pass the rig to geometry nodes as an input."""
+    """Add an object with geometry nodes that get the face's armature as an input."""
     tree = bpy.data.node_groups.new("Reads", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -126,7 +126,7 @@ def nodes_with_the_rig(rig):
 
 
 def node_of_the_rig(rig):
-    """Use the rig in a node of geometry nodes."""
+    """Add an object with geometry nodes in which a node Object Info reads the face's armature."""
     tree = bpy.data.node_groups.new("Names", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     tree.nodes.new("NodeGroupOutput")
@@ -219,7 +219,10 @@ SCRIPTED = [child_of_a_bone, constraint, driver, clothes]
 
 
 def test_a_script_that_steps_to_the_next_frame_without_an_update(pair):
-    """Without an interface, Blender reports an edit only with the next frame."""
+    """Edits by a script are noticed at the next frame, although no update comes before it.
+
+    Without an interface, Blender tells add-ons of an edit only at the next frame change.
+    """
     for rig in pair.each():
         bone = scene.face(rig)
         name = next(k for k in bone.keys() if k.endswith("jawOpen"))  # noqa: SIM118

@@ -30,7 +30,11 @@ def _camera(collection):
 
 
 def _seen(rig, camera):
-    """The corners of the face's bounding boxes in the picture, (0, 0) to (1, 1)."""
+    """Corners of the bounding boxes of a face's meshes as the camera sees them, float64[N, 3].
+
+    x and y are (0, 0) at the lower left corner of the picture and (1, 1) at the upper right; z is
+    the distance from the camera.
+    """
     corners = [m.matrix_world @ Vector(c) for m in scene.meshes(rig).values() for c in m.bound_box]
     return np.array([world_to_camera_view(bpy.context.scene, camera, c) for c in corners])
 
@@ -153,7 +157,10 @@ def _corners(item):
 
 
 def test_no_shirt_ends_in_the_picture(rig):
-    """Tested with a hem that is higher in the middle than at the sides, like a child's."""
+    """The hem of a shirt is below the picture of the studio's camera.
+
+    The hem is higher in the middle than at the sides, as on a child's shirt.
+    """
     bpy.ops.risorius.add_character()
     man = next(
         o for o in bpy.data.objects if o.name.startswith("Sample") and o.name.endswith("_rig")

@@ -10,14 +10,16 @@ NEAR = 1e-5  # tolerated distance, relative to the face's size
 
 
 def plan(rig):
-    """The last conditions.Plan of a face: the meshes whose positions the add-on computes."""
+    """The last conditions.Plan of a face, which lists the meshes in Direct mode."""
     return scene.submodule("scene.skinning.conditions").known(rig)
 
 
 def is_direct(rig, *numbers):
     """Whether meshes of a face are in Direct mode and have a disabled armature modifier.
 
-    Args: numbers: DNA indices of the meshes; empty: all meshes.
+    Args:
+        rig: deforming armature of the face.
+        numbers: indices of the meshes in the DNA file; none: all meshes.
     """
     items = scene.meshes(rig)
     wanted = [items[n] for n in numbers or items]
@@ -26,9 +28,10 @@ def is_direct(rig, *numbers):
 
 
 def normals(item):
-    """Normals of the corners of the evaluated mesh, float64[C, 3], and which to compare, bool[C].
+    """Corner normals of an evaluated mesh, float64[C, 3], and whether to compare each, bool[C].
 
-    A corner between polygons with opposite normals, as in teeth of coarse levels, has no normal.
+    A corner at which polygons have opposite normals is not compared, because its normal is
+    arbitrary. The teeth of coarse levels of detail have such corners.
     """
     seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = seen.to_mesh()
@@ -48,7 +51,10 @@ def normals(item):
 
 
 def bones(rig):
-    """float64[B, 4, 4]: posed matrices of the evaluated deforming armature's bones."""
+    """Matrices of the posed bones of a deforming armature in armature space, float64[B, 4, 4].
+
+    In memory, the matrices are in Blender's order, column by column.
+    """
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
     flat = np.empty(len(seen) * 16, np.float32)
     seen.foreach_get("matrix", flat)
@@ -56,13 +62,13 @@ def bones(rig):
 
 
 def settle():
-    """Let Blender evaluate edits, and then the values that the add-on wrote in response."""
+    """Let Blender evaluate edits, and then evaluate the values that the add-on has written."""
     bpy.context.view_layer.update()
     bpy.context.view_layer.update()
 
 
 class Pair:
-    """Two imports of a file at the same place, one in Direct mode and one in Live mode.
+    """Two imports of a DNA file at the same place, one in Direct mode and one in Live mode.
 
     Attributes:
         direct, live: deforming armatures of the face in Direct mode and of the face in Live mode.
@@ -79,19 +85,29 @@ class Pair:
         return self.direct, self.live
 
     def set(self, **values):
-        """Set sliders of both faces."""
+        """Set sliders of both faces: end of a slider's name -> value."""
         for rig in self.each():
             scene.set_controls(rig, **values)
         settle()
 
     def edit(self, change):
-        """Make an edit of both faces. Args: change: function of the armature and the head mesh."""
+        """Make an edit of both faces. Returns the two results of `change`.
+
+        Args:
+            change: function that makes the edit; it gets the deforming armature and the head mesh.
+        """
         done = [change(rig, scene.meshes(rig)[0]) for rig in self.each()]
         settle()
         return done
 
     def apart(self, lod=0):
-        """Largest coordinate difference of vertices in armature space / size of the face."""
+        """Largest coordinate difference of the two faces' vertices, as a share of the face size.
+
+        The vertices are compared in armature space.
+
+        Args:
+            lod: level of detail whose meshes are compared.
+        """
         found = []
         for rig in self.each():
             place = np.linalg.inv(np.array(rig.matrix_world))
@@ -107,7 +123,11 @@ class Pair:
         return float(np.abs(bones(self.direct) - bones(self.live)).max())
 
     def check(self, near=NEAR):
-        """Assert that both faces have the same shape in two poses."""
+        """Assert that the vertices of both faces are equal within `near` in two poses.
+
+        Args:
+            near: tolerance as a share of the face size.
+        """
         for values in ((0.9, 0.2), (0.3, 0.8)):
             self.set(jawOpen=values[0], mouthCornerPullL=values[1])
             assert self.apart() < near

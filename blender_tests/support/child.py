@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs code in a separate Blender process, with other environment variables or risk of a crash."""
+"""Runs code in a separate Blender process, because it may crash or needs another environment."""
 
 import os
 import sys
@@ -37,11 +37,13 @@ os._exit(code)
 
 
 def run(tmp_path, body, cpu=300, **environment):
-    """Run lines of Python that can use `bpy` and `scene`.
+    """Run lines of Python in a separate Blender process with the add-on enabled.
+
+    The lines can use `bpy` and `support.scene` as `scene`.
 
     Args:
         tmp_path: folder for the script.
-        body: the lines.
+        body: the lines of Python.
         cpu: limit of CPU time in seconds.
         environment: environment variables to set.
 

@@ -8,7 +8,11 @@ import bpy
 
 @contextmanager
 def editor(kind):
-    """Context manager: operators run in an editor. Args: kind: a value of Area.type."""
+    """Context manager in which operators run as in an editor of Blender.
+
+    Args:
+        kind: type of the editor, a value of bpy.types.Area.type such as "GRAPH_EDITOR".
+    """
     window = bpy.context.window_manager.windows[0]
     area = window.screen.areas[0]
     before, area.type = area.type, kind

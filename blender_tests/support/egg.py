@@ -16,7 +16,10 @@ _METRES = 0.01
 
 
 def egg():
-    """Add the head as active object, facing -y, with a shape key per expression of face_shapes."""
+    """Add the head as active object.
+
+    The head faces -y, and has a shape key for each expression of face_shapes.expressions.
+    """
     positions, faces = face_shapes.head()
     mesh = bpy.data.meshes.new("Egg")
     mesh.from_pydata(_to_blender(positions).tolist(), [], faces.tolist())

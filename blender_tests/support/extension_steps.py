@@ -22,10 +22,10 @@ MODULE = "bl_ext.user_default.risorius"
 
 
 def of_ours():
-    """The add-on's parts that are registered in this process.
+    """The parts of the add-on that are registered in this process.
 
-    Names of its preferences, handlers, classes, operators and properties, and the number of its
-    entries in the menus Import and Add.
+    The result contains the names of the add-on's preferences, handlers, classes, operators and
+    properties, and the number of its entries in the menus Import and Add.
     """
     handlers = [
         name
@@ -60,9 +60,13 @@ def _manager():
 
 
 def _read_preferences(step):
-    """Read the user's preferences, because bpy starts with factory settings.
+    """Read the user's preferences, because the bpy module starts with factory settings.
 
-    bpy before 4.5 crashes while reading them, so the extension is enabled directly.
+    Versions of the bpy module before 4.5 crash while they read preferences, so this function
+    enables the extension directly there.
+
+    Args:
+        step: name of the step.
     """
     if bpy.app.version >= (4, 5, 0):
         bpy.ops.wm.read_userpref()
@@ -84,7 +88,7 @@ def install(package):
 
 
 def _vertices(item):
-    """Places of the evaluated vertices of a mesh."""
+    """Places of the evaluated vertices of a mesh object, in object space."""
     graph = bpy.context.evaluated_depsgraph_get()
     return [tuple(v.co) for v in item.evaluated_get(graph).data.vertices]
 
@@ -138,7 +142,10 @@ def disable(_nothing=""):
 
 
 def look(blend):
-    """Open a scene with a face without the add-on, and change the frame."""
+    """Open a .blend file with a face while the add-on is disabled or removed, and change the frame.
+
+    Returns the registered parts of the add-on, and the number of the face's meshes.
+    """
     bpy.ops.wm.open_mainfile(filepath=blend)
     bpy.context.scene.frame_set(3)
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes small DNAs for tests: three meshes, two LODs, joints, channels, maps and odd names."""
+"""Makes small Dna objects for tests: three meshes, two LODs, joints, channels, maps, odd names."""
 
 import numpy as np
 import risorius
@@ -25,10 +25,12 @@ UNOWNED = 5  # a joint that no joint group moves
 
 
 def _grid(columns, rows, radius, center):
-    """Positions, normals, UVs and quads of a patch of a sphere that faces the DNA's front (+z).
+    """Positions, normals, UVs and quads of a patch of a sphere whose outside faces +z.
+
+    In the axes of `small_face`, +z is the front of the face.
 
     Args:
-        columns, rows: numbers of vertices.
+        columns, rows: numbers of vertices along x and along y.
         radius: radius of the sphere in the DNA's unit.
         center: float[3], centre of the sphere.
     """
@@ -83,12 +85,14 @@ def small_face(
     translation_unit="cm",
     head_grid=(12, 14),
 ):
-    """A Dna with all data that the add-on imports except RBF poses; equal arguments, equal Dna.
+    """A Dna with all data that the add-on imports, except RBF poses.
+
+    Equal arguments give an equal Dna.
 
     Args:
         name: name of the face.
-        axes, rotation_sequence, rotation_signs, rotation_unit, translation_unit: conventions of the
-            file.
+        axes, rotation_sequence, rotation_signs, rotation_unit, translation_unit: the Dna's axes,
+            conventions of its Euler angles, and units.
         head_grid: columns and rows of vertices of the head mesh.
     """
     random = np.random.default_rng(7)
@@ -136,7 +140,13 @@ def small_face(
 
 
 def _behave(dna, random, angle):
-    """Add joint groups of the jaw (nine attributes) and an eye, a corrective, channels, maps."""
+    """Add the behaviour of a small face: joint groups, one corrective, channels and animated maps.
+
+    Args:
+        dna: the face.
+        random: random generator of the jaw's values.
+        angle: 1 degree in the unit of the Dna's rotations.
+    """
     count = len(CONTROLS)
     jaw = random.uniform(-1, 1, (9, 3)).astype(np.float32)
     jaw[3:6] *= 25 * angle
@@ -184,8 +194,9 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
 
     Args:
         dna: a small_face.
-        joints, controls, channels, maps: the new order, as old indices and names of new items.
-            Old items that the order lacks are removed with their data. None: no change.
+        joints, controls, channels, maps: the new items in their order: an index stands for an old
+            item, a name for a new item. Old items that are missing are removed with their data.
+            None: no change.
 
     Returns:
         The same Dna.
@@ -206,7 +217,10 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
 
 
 def _order(names, order):
-    """The new names, and for each old name its new index (-1: removed)."""
+    """Apply an order of `renumbered` to names.
+
+    Returns the new names, and for each old name its new index (-1: removed), int64[names].
+    """
     where = np.full(len(names), -1)
     for new, old in enumerate(order):
         if not isinstance(old, str):
@@ -247,7 +261,10 @@ def _renumber_channels(dna, order):
 
 
 def _renumber_controls(dna, order):
-    """Reorder controls; controls that joints, correctives or GUI controls use must remain."""
+    """Reorder raw controls by `order`, as `renumbered` describes it.
+
+    Controls that joints, correctives or GUI controls use must not be removed.
+    """
     count = len(dna.raw_control_names)
     dna.raw_control_names, where = _order(dna.raw_control_names, order)
     where = np.append(where, len(order))  # the corrective has the index after the controls
@@ -266,7 +283,11 @@ def _renumber_controls(dna, order):
 
 
 def _renumber_joints(dna, order):
-    """Reorder joints; new ones become children of the first joint, used joints must remain."""
+    """Reorder joints by `order`, as `renumbered` describes it.
+
+    New joints become children of the joint that was first before. Joints with joint groups or skin
+    weights must not be removed.
+    """
     offsets, angles = dna.neutral_joint_translations, dna.neutral_joint_rotations
     parents = dna.joint_parents
     dna.joint_names, where = _order(dna.joint_names, order)
@@ -287,7 +308,10 @@ def _renumber_joints(dna, order):
 
 
 def other_face(**options):
-    """The small face as in a later version: with other indices, removed items and new items."""
+    """The small face as in a later version of its file: with other, removed and new items.
+
+    Most joints, controls, channels and maps have other indices than in the small face.
+    """
     dna = renumbered(
         small_face(**options),
         joints=[0, "new_joint", 1, 2, 5, 4, 3],
@@ -303,7 +327,8 @@ def other_face(**options):
 
 TURNING = tuple(f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw")
 UP, SIDE = 1, 2  # indices in NECK_POSES of two poses of neck_face
-# Quaternions x y z w of neck_01 and then head in each pose, relative to rest, in the joints' axes.
+# For each pose, the rotations of neck_01 and head from rest about the joints' axes: two quaternions
+# x, y, z, w one after the other.
 NECK_POSES = (
     (0, 0, 0, 1, 0, 0, 0, 1),
     (0, 0, 0.0871557, 0.9961947, 0, 0, 0.2164396, 0.9762960),
@@ -314,9 +339,9 @@ NECK_POSES = (
 def neck_face(**options):
     """The small face with an RBF solver that deforms it when neck and head rotate.
 
-    The raw controls of TURNING are rotations of joints. The solver's poses UP and SIDE of
-    NECK_POSES drive channels 4 and 5. UP together with the open jaw makes a corrective active,
-    which drives channel 2.
+    The raw controls TURNING are the quaternions of neck and head. The poses of the solver are
+    NECK_POSES: pose UP drives channel 4, and pose SIDE drives channel 5. Pose UP together with the
+    open jaw activates a corrective that drives channel 2.
     """
     dna = small_face(**options)
     count = len(CONTROLS)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts the lines of a panel; tests use it to check that a click moves no line below."""
+"""Counts the lines that a panel draws.
+
+Tests thus check that no click in a panel moves the panels below it.
+"""
 
 from types import SimpleNamespace
 
@@ -10,7 +13,7 @@ _LEAVES += ("operator_menu_enum", "template_list", "prop_enum")
 
 
 class Lines:
-    """A fake UILayout that counts lines. A row is as high as its highest part."""
+    """A fake UILayout that counts the lines of a panel. A row counts as its highest part."""
 
     def __init__(self, beside=False):
         object.__setattr__(self, "_beside", beside)
@@ -29,7 +32,7 @@ class Lines:
         return part
 
     def panel(self, *_arguments, **_options):
-        """Header and body of a subpanel, which is always open."""
+        """Add a subpanel, which is always open. Returns its header and its body."""
         return self._part(Lines(beside=True)), self._part(Lines())
 
     def __getattr__(self, name):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes broken DNA files, and valid files with unusual content.
 
-Broken files have indices out of range, cycles of joints or huge counts. The library refuses to
-write them, so the bytes of valid files are changed.
+Broken files have indices out of range, cycles of joints or huge counts. The package risorius
+refuses to write such files, so this module changes bytes of valid files.
 """
 
 from pathlib import Path
@@ -20,9 +20,10 @@ def found_by_fuzzing():
 
 
 def broken_on_purpose():
-    """Yields (name, bytes, whether it must be refused) of the files of tests/data/malformed.
+    """Yield (name, bytes, whether reading must fail) for each broken file of tests/data/malformed.
 
-    A line of edits.txt: name, base, outcome, and edits `offset:removed bytes:inserted bytes`.
+    Each line of edits.txt defines a file: name, name of the valid file, outcome, and edits
+    `offset:number of removed bytes:inserted bytes in hexadecimal`.
     """
     bases = {}
     for line in (DATA / "malformed" / "edits.txt").read_text(encoding="utf-8").splitlines():
@@ -38,7 +39,7 @@ def broken_on_purpose():
 
 
 def cut_short(content, count):
-    """Yield up to `count` beginnings of a file, from no byte to all bytes except one."""
+    """Yield up to `count` beginnings of a file, from the empty one to one that lacks one byte."""
     for length in np.unique(np.linspace(0, len(content) - 1, count).astype(int)):
         yield content[:length]
 
@@ -72,7 +73,7 @@ def _set(face, mesh=None, **values):
 
 
 def _numbers(face, value):
-    """Set some numbers of each list of the meshes to the same value."""
+    """Set some elements of each array of numbers in the meshes to `value`."""
     meshes = list(face.meshes)
     for mesh in meshes:
         mesh.positions = _with(mesh.positions, value, np.s_[::5])
@@ -87,7 +88,7 @@ def _numbers(face, value):
 
 
 def _surface(face, value):
-    """Set some normals and texture coordinates, which affect only shading, to a value."""
+    """Set some normals and texture coordinates to `value`; these affect only the shading."""
     for mesh in range(len(face.meshes)):
         normals, uvs = face.meshes[mesh].normals, face.meshes[mesh].texture_coordinates
         _set(
@@ -107,7 +108,7 @@ def _neutral(face, value):
 
 
 def _named(face, text):
-    """Give all elements of a face the same name."""
+    """Give the face, its joints, raw controls, channels, maps and meshes the same name `text`."""
     face.name = text
     face.joint_names = [text] * len(JOINTS)
     face.raw_control_names = [text] * len(CONTROLS)
@@ -118,7 +119,10 @@ def _named(face, text):
 
 
 def _flat_faces(face):
-    """Replace polygons by ones with one or two corners, or with one vertex at several corners."""
+    """Replace the polygons of all meshes by polygons without area.
+
+    They have one or two corners, or one vertex at several corners.
+    """
     layouts = np.array([0, 1, 2, 5, 5, 5, 5, 6, 7, 6], np.uint32)
     for mesh in range(len(face.meshes)):
         _set(face, mesh, face_layouts=layouts, face_offsets=np.array([0, 1, 3, 7, 10], np.uint32))
@@ -182,7 +186,8 @@ def _matrix(face, value):
     face.joint_groups = groups
 
 
-# name -> function that changes a small face; each result can be written and parsed
+# Name of a change -> function that changes a small face. risorius can write and parse each changed
+# face.
 ODD = {
     "nan everywhere": lambda f: _numbers(f, np.nan),
     "infinite numbers": lambda f: _numbers(f, np.inf),
@@ -220,7 +225,7 @@ ODD = {
 
 
 def odd_face(name):
-    """Bytes of a DNA file: a small face with the change ODD[name]."""
+    """The bytes of a DNA file with a small face that ODD[name] has changed."""
     face = small_face()
     ODD[name](face)
     return face.to_bytes()

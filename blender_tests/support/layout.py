@@ -10,10 +10,14 @@ ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum
 
 
 class Recorder:
-    """Accepts every call of a panel, and looks up properties and operators as Blender does.
+    """A fake UILayout that accepts every call of a panel.
 
-    `labels` are the drawn texts, with texts of buttons; `operators` the names of the buttons'
-    operators; `properties` the paths of the properties that the panel shows.
+    An unknown property, operator or icon raises an error, as in Blender.
+
+    Attributes:
+        labels: the drawn texts, also of buttons.
+        operators: names of the operators that have buttons.
+        properties: paths of the properties that the panel shows.
     """
 
     def __init__(self, top=None):
@@ -57,7 +61,7 @@ class Recorder:
         return lambda *_a, **_o: Recorder(self._top)
 
     def text(self, between=" "):
-        """All drawn texts, joined by `between`."""
+        """All drawn texts in the order of drawing, joined by `between`."""
         return between.join(self.labels)
 
 

@@ -8,7 +8,7 @@ from mathutils import Vector
 
 from .faces import small_face
 
-# Mesh name without LOD -> kind of the mesh, see plans.kind_of.
+# Name of a mesh without the ending for its LOD -> kind of its material, as plans.kind_of gives it.
 KINDS = {
     "head": "skin",
     "body": "skin",
@@ -24,7 +24,13 @@ KINDS = {
 
 
 def copy_mesh(mesh, offset=(0.0, 0.0, 0.0), scale=1.0):
-    """A mesh's shifted and scaled copy without shapes. offset: in the DNA's axes and units."""
+    """A copy of a mesh without blend shapes, scaled about its middle and shifted.
+
+    Args:
+        mesh: the mesh.
+        offset: the shift, in the axes and unit of the Dna.
+        scale: factor of the size.
+    """
     middle = mesh.positions.mean(axis=0)
     moved = (mesh.positions - middle) * scale + middle + np.array(offset, np.float32)
     names = ("normals", "texture_coordinates", "layout_positions", "layout_normals")
@@ -35,7 +41,12 @@ def copy_mesh(mesh, offset=(0.0, 0.0, 0.0), scale=1.0):
 
 
 def set_meshes(dna, meshes):
-    """Replace the meshes of a face by {name: Mesh}; afterwards it has one LOD."""
+    """Replace the meshes of a face, which then has one LOD. Returns the same Dna.
+
+    Args:
+        dna: the face.
+        meshes: name -> new Mesh.
+    """
     dna.mesh_names, dna.meshes = list(meshes), list(meshes.values())
     dna.lod_count = 1
     dna.lod_mesh_mapping = [list(range(len(meshes)))]
@@ -55,7 +66,7 @@ def set_meshes(dna, meshes):
 
 
 def every_kind():
-    """A face with one mesh for each name in KINDS; MetaHumans have meshes with these names."""
+    """A Dna with one mesh for each name in KINDS; MetaHumans have meshes with these names."""
     dna = small_face()
     patch = dna.meshes[1]
     meshes = {"head_lod0_mesh": dna.meshes[0]}
@@ -66,7 +77,12 @@ def every_kind():
 
 
 def write_image(path, pixels):
-    """Write float[H, W, 3 or 4] as a PNG; values are not converted between colour spaces."""
+    """Write pixels as a PNG file, without conversion between colour spaces.
+
+    Args:
+        path: path of the file.
+        pixels: float[H, W, 3 or 4], values from 0 to 1, row 0 at the bottom.
+    """
     height, width, channels = pixels.shape
     image = bpy.data.images.new(path.stem, width, height, alpha=channels == 4)
     image.colorspace_settings.is_data = True
@@ -80,14 +96,20 @@ def write_image(path, pixels):
 
 
 def halves(left, right, size=16):
-    """float32[size, size, n]: pixels with the colour `left` for u < 0.5 and `right` elsewhere."""
+    """Square pixels with one colour in each half, float32[size, size, n].
+
+    Args:
+        left: colour with n channels of the left half, u < 0.5.
+        right: colour of the right half.
+        size: width and height in pixels.
+    """
     pixels = np.empty((size, size, len(left)), np.float32)
     pixels[:, : size // 2], pixels[:, size // 2 :] = left, right
     return pixels
 
 
 def stage(items, size=32, engine="CYCLES", samples=4):
-    """Light the scene by two suns, and look at some objects from the front (-y).
+    """Add two suns, and an orthographic camera that sees some objects from the front (-y).
 
     Args:
         items: the objects to show.
@@ -132,7 +154,10 @@ def stage(items, size=32, engine="CYCLES", samples=4):
 
 
 def render(setup, path):
-    """Render a still to a file. Returns pixels float32[size, size, 4], row 0 at the bottom."""
+    """Render the current frame to a file. Returns its pixels, float32[size, size, 4].
+
+    Row 0 of the pixels is at the bottom.
+    """
     setup.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(str(path), check_existing=False)
@@ -144,7 +169,7 @@ def render(setup, path):
 
 
 def upstream(socket):
-    """All nodes that are connected to an input socket, directly or through other nodes."""
+    """All nodes whose output reaches an input socket, directly or through other nodes."""
     seen, todo = set(), [link.from_node for link in socket.links]
     while todo:
         node = todo.pop()
@@ -155,5 +180,5 @@ def upstream(socket):
 
 
 def principled(material):
-    """The Principled shader of a material, or None."""
+    """The Principled BSDF node of a material, or None if it has none."""
     return next((n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"), None)

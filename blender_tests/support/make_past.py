@@ -3,8 +3,9 @@
 
     python blender_tests/support/make_past.py ZIP FOLDER [--record]
 
-Run by a Python with bpy. With --record, the build ZIP plays the existing files of FOLDER, and their
-values are written to FOLDER/values.npz.
+Run the script with a Python that has bpy. ZIP is the old build of the extension. Without --record,
+the script makes the .blend files in FOLDER. With --record, it uses the existing files of FOLDER. In
+both cases it writes the values of the played animation to FOLDER/values.npz.
 """
 
 import argparse
@@ -18,7 +19,7 @@ HERE = Path(__file__).resolve()
 
 
 def _start(package):
-    """Install an extension's package in a temporary user folder, for this process."""
+    """Install the zip file of an extension in a temporary user folder, for this process."""
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="risorius-past-")
     import bpy
 
@@ -40,7 +41,8 @@ def main():
     _start(options.zip)
     from support import past, past_scenes
 
-    # A .blend contains its path, so files are saved in a folder with a neutral name.
+    # A .blend file contains its path, so the files are saved in a folder whose path does not name
+    # the user.
     work = Path(tempfile.gettempdir()) / "risorius-past"
     shutil.rmtree(work, ignore_errors=True)
     if options.record:

@@ -3,8 +3,8 @@
 
 The fake layout calculates the widths of Blender's layouts at an interface scale of 1 with
 Blender's font. Each part of a column has the column's width. A row divides its width in proportion
-to the widths that its parts request, and a split by its factor. With use_property_split, names get
-the left two fifths of the width.
+to the widths that its parts request, and a split divides its width by its factor. With
+use_property_split, the names of properties get the left two fifths of the width.
 """
 
 from types import SimpleNamespace
@@ -22,28 +22,31 @@ _ASKED = 30  # pixels that a button requests from a row in addition to its text
 _NUMBER = 60  # pixels that a number field requests in addition to its text
 _NAMES = 0.4
 _VALUE = "0.000"
-# Heights in pixels, measured in a window of Blender 4.3, where they are larger than in 5.2.
+# Heights in pixels of a panel's header, a subpanel's header, a line, and the space above and below
+# a panel's content. They were measured in Blender 4.3, where they are larger than in 5.2.
 HEADER, SUB_HEADER, _LINE, EDGES = 28, 25, 21, 10
-# English -> translation. Replaces Blender's translations, which the bpy module does not have.
+# English text -> translation. Tests fill this table, because the bpy module has no translations of
+# Blender.
 LOCAL = {}
 
 
 def width_of(text):
-    """The width of a text in Blender's interface font, in pixels."""
+    """The width of a text in Blender's interface font, in pixels at an interface scale of 1."""
     points = bpy.context.preferences.ui_styles[0].widget.points
     blf.size(0, points)
     return blf.dimensions(0, text)[0]
 
 
 def local(text):
-    """The translation of a label by LOCAL, or the label itself."""
+    """The translation of a label from LOCAL, or the label itself if LOCAL has none."""
     return LOCAL.get(text, text)
 
 
 class Part:
     """A row, a column, a grid or a split.
 
-    Its children are Parts and (text, pixels to show it fully, pixels that it requests from a row).
+    Its children are Parts, and leaves (text, pixels that show the text fully, pixels that the leaf
+    requests from a row).
     """
 
     everything_open = True  # False: nested panels have their default state
@@ -180,14 +183,17 @@ class Part:
         return sum(asked) if self.kind == "row" else max(asked, default=0)
 
     def height(self):
-        """The height of this part in pixels."""
+        """The height of this part in pixels, if its texts are not wrapped."""
         if self.is_header:
             return SUB_HEADER
         tall = [c.height() if isinstance(c, Part) else _LINE for c in self.children]
         return max(tall, default=0) if self.kind in ("row", "split") else sum(tall)
 
     def cut(self, width):
-        """(text, needed pixels, available pixels) of each text that is cut off at this width."""
+        """The texts that are cut off if this part has a width of `width` pixels.
+
+        Returns (text, needed pixels, available pixels) for each.
+        """
         found = []
         for child, room in zip(self.children, self._rooms(width), strict=True):
             if isinstance(child, Part):
@@ -216,7 +222,12 @@ def _property(data, name):
 
 
 class Operator:
-    """A fake instance of an operator for its draw(), with given or default property values."""
+    """Stands for an instance of an operator class, so that its draw() can be called.
+
+    Args:
+        kind: the operator class.
+        given: values of properties; all other properties have their default values.
+    """
 
     def __init__(self, kind, **given):
         self._kind = kind
@@ -235,13 +246,19 @@ class Operator:
         return rule.default_array if getattr(rule, "is_array", False) else rule.default
 
     def draw(self, context):
-        """Call the operator's draw(). Returns the drawn Part."""
+        """Call draw() of the operator class. Returns the Part that it has drawn into."""
         self._kind.draw(self, context)
         return self.layout
 
 
 def drawn(kind, context, **given):
-    """The Part that a panel or list draws. given: further attributes of the fake panel."""
+    """Let a panel or list draw into a new Part, and return the Part.
+
+    Args:
+        kind: class of the panel or list.
+        context: context of Blender.
+        given: further attributes of the object that stands for an instance of the class.
+    """
     layout = Part()
     kind.draw(SimpleNamespace(layout=layout, **given), context)
     return layout

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Computes skinning and morphing in float64 from the description of the format alone.
 
-This module uses no code of the add-on: it takes a Pose and returns vertices in Blender's axes and
-units.
+This module uses no code of the add-on. It takes a Pose, which contains the joints and the weights
+of blend shape channels, and returns vertices in Blender's axes and units.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ def _rotation(dna, angles):
     """Rotation matrix for column vectors; the first axis of the rotation sequence acts first.
 
     Args:
-        dna: gives unit, order and signs of the rotations.
+        dna: Dna with the unit, sequence and signs of the rotations.
         angles: float64[3], in the DNA's unit.
     """
     if dna.rotation_unit == "degrees":
@@ -37,7 +37,13 @@ def _rotation(dna, angles):
 
 
 def _world(dna, deltas, turns=None):
-    """World matrices of joints in the DNA's axes and units. turns: as in `vertices`."""
+    """World matrices of all joints in the axes and units of the Dna, a list of float64[4, 4].
+
+    Args:
+        dna: the face.
+        deltas: float[joints, 9], values of a Pose that are added to the neutral joints.
+        turns: as in `vertices`.
+    """
     parents = dna.joint_parents
     result = []
     for joint, parent in enumerate(parents):
@@ -61,14 +67,15 @@ def to_blender(dna, points, unit_scale=1.0):
 
 
 def vertices(dna, mesh_index, pose, unit_scale=1.0, turns=None):
-    """Deformed vertices of a mesh, float64[V, 3], in Blender's axes and units.
+    """Vertices of a mesh after morph and skinning, float64[V, 3], in Blender's axes and units.
 
     Args:
         dna: the face.
         mesh_index: index of the mesh.
         pose: risorius.Pose.
         unit_scale: metres per Blender unit.
-        turns: joint -> float64[3, 3], additional rotation relative to rest, in the joint's axes.
+        turns: index of a joint -> float64[3, 3], a rotation about the joint's axes at rest that is
+            added to the joint's pose; None: no added rotations.
     """
     mesh = dna.meshes[mesh_index]
     points = mesh.positions.astype(np.float64)

@@ -13,8 +13,8 @@ DATA = Path(__file__).resolve().parents[1] / "data" / "past"
 FRAMES = (1.0, 4.5, 9.0, 14.0, 20.0, 31.0)
 AS_SAVED = "as saved"
 LIVE_AGAIN = "live again"
-# File -> ways to play it: as saved, after undoing a bake (LIVE_AGAIN), or with an action of this
-# name assigned.
+# Name of a file -> ways to play it: AS_SAVED, LIVE_AGAIN (after its bake was undone), or the name
+# of an action that is assigned before.
 PLAYS = {
     "layers": (AS_SAVED, "Other"),
     "meta": (AS_SAVED,),
@@ -32,7 +32,7 @@ PLAYS = {
 
 @contextmanager
 def scalar():
-    """A context in which faces use the scalar kernels, which give equal results on all CPUs."""
+    """Context manager in which faces are evaluated without SIMD, with equal results on all CPUs."""
     before = os.environ.get("RISORIUS_SIMD")
     os.environ["RISORIUS_SIMD"] = "scalar"
     try:
@@ -45,18 +45,22 @@ def scalar():
 
 
 def rigs():
-    """The scene's deforming armatures of faces, also linked ones, sorted by name."""
+    """The deforming armatures of all faces in the scene, sorted by name; linked faces count too."""
     found = [o for o in bpy.context.scene.objects if "risorius_controls" in o]
     return sorted(found, key=lambda o: o.name)
 
 
 def controls():
-    """The control armatures of the scene's faces, in the same order."""
+    """The control armatures of all faces in the scene, in the order of `rigs`."""
     return [rig["risorius_controls"] for rig in rigs()]
 
 
 def open_it(path, _folder):
-    """Open a file; ignore the error of Blender 5.2 when it repairs override roots from 4.2."""
+    """Open a file.
+
+    Blender 5.2 raises an error when it repairs hierarchy roots of overrides from 4.2; this error is
+    ignored.
+    """
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path))
     except RuntimeError as error:
@@ -65,7 +69,7 @@ def open_it(path, _folder):
 
 
 def _open_if_needed(path, folder):
-    """Open a file unless it is open and unchanged, because opening takes most of the time."""
+    """Open a file, unless it is open and unchanged: opening takes most of the tests' time."""
     if bpy.data.filepath != str(path) or "touched" in bpy.context.scene:
         open_it(path, folder)
 
@@ -135,20 +139,20 @@ ROUTES = {
     "link": link,
     "override": override,
 }
-# Keys of ROUTES (ways to open a file) that are not used for files with library overrides.
+# Ways to open a file (keys of ROUTES) that are not used for files with library overrides.
 NOT_OVERRIDDEN = ("append", "link", "override")
 
 
 def routes_of(name):
-    """The keys of ROUTES that are used for a file."""
+    """The ways to open the file `name` (keys of ROUTES)."""
     skipped = NOT_OVERRIDDEN if name.startswith("overridden") else ()
     return [route for route in ROUTES if route not in skipped]
 
 
 def show(mode):
-    """Show faces in Direct mode ("AUTO") or with posed bones ("LIVE").
+    """Set the mode of all faces: Direct mode ("AUTO"), or posed bones ("LIVE").
 
-    Linked faces and overrides are not changed.
+    Linked faces and library overrides keep their mode.
     """
     for rig in rigs():
         if rig.library is None and rig.override_library is None:
@@ -158,7 +162,11 @@ def show(mode):
 
 
 def prepare(play):
-    """Prepare the open file for playing, with posed bones as when the files were made."""
+    """Prepare the open file for playing, with posed bones as when the files were made.
+
+    Args:
+        play: a way to play the file, from PLAYS.
+    """
     show("LIVE")
     if play != AS_SAVED:
         bpy.context.scene["touched"] = True
@@ -180,7 +188,7 @@ def prepare(play):
 def _choose_slot(item):
     """Choose the first slot of an object's action if no slot is chosen.
 
-    Blender 5.0 chooses none for an override's action that comes from 4.2.
+    If an override and its action come from 4.2, Blender 5.0 chooses no slot.
     """
     data = item.animation_data
     if data is not None and data.action is not None and hasattr(data, "action_slot"):
@@ -188,12 +196,13 @@ def _choose_slot(item):
 
 
 def film(frames=FRAMES, read=None):
-    """Record the faces of the open file: {"face/frame/what": float32[...]}.
+    """Play the open file, and record its faces: {"face/frame/kind of value": float32[...]}.
 
     Args:
         frames: frames to play, in this order.
-        read: reader of a face's values in a depsgraph; None: the reader `_read`, of bones, shape
-            keys, channels, maps and the world matrix.
+        read: function of the deforming armature and the depsgraph that returns kind of value ->
+            values; None: `_read`, which reads bones, shape keys, channels, maps and the world
+            matrix.
     """
     found = {}
     for frame in frames:
@@ -233,7 +242,7 @@ def _read(rig, depsgraph):
 
 
 def vertices(rig, depsgraph):
-    """A reader for `film`: the vertices of each mesh of a face in world space."""
+    """The vertices of each mesh of a face in world space, float64[V, 3]; for `read` of `film`."""
     found = {}
     for key in sorted(k for k in rig.keys() if k.startswith("risorius_mesh_")):  # noqa: SIM118
         seen = rig[key].evaluated_get(depsgraph)
@@ -245,7 +254,7 @@ def vertices(rig, depsgraph):
 
 
 def direct_rigs():
-    """The faces in Direct mode: at least one of their meshes has computed positions."""
+    """The deforming armatures of faces that have at least one mesh in Direct mode."""
     return [
         rig
         for rig in rigs()
@@ -261,16 +270,16 @@ def _numbers(bone):
 
 
 def films(folder, name, work, routes=None):
-    """Open a file by each route, and play it in each way.
+    """Open a file in each way of ROUTES, and play it in each way of PLAYS.
 
     Args:
         folder: folder of the files.
         name: a key of PLAYS.
-        work: folder for copies.
-        routes: keys of ROUTES; None: all routes of the file.
+        work: folder for copies of the file.
+        routes: ways to open the file; None: all ways of `routes_of`.
 
     Yields:
-        "name/route/play" and its film.
+        "name/route/play", and what `film` recorded.
     """
     for route in routes or routes_of(name):
         ROUTES[route](folder / f"{name}.blend", work)
@@ -280,7 +289,10 @@ def films(folder, name, work, routes=None):
 
 
 def record(folder):
-    """Write the films of a folder's files to its values.npz; equal films are written once."""
+    """Record the files of a folder by `film`, and write the recordings to the folder's values.npz.
+
+    Equal recordings are written once.
+    """
     index, kept = {}, []
     for name in PLAYS:
         for key, found in films(folder, name, Path(bpy.app.tempdir)):
@@ -295,7 +307,7 @@ def record(folder):
 
 
 def recorded(folder):
-    """The films that `record` wrote for a folder: "name/route/play" -> film."""
+    """The recordings in a folder's values.npz: "name/route/play" -> result of `film`."""
     with np.load(folder / "values.npz") as held:
         films_of = {}
         for key, entry in json.loads(str(held["index"])).items():

@@ -11,7 +11,11 @@ EYES = ("eyeBlinkL", "eyeBlinkR", "eyeSquintInnerL")
 
 
 def make_all(folder):
-    """Make every scene in an empty file, and save it in a folder under the function's name."""
+    """Make each scene in an empty .blend file, and save the file under the name of its function.
+
+    Args:
+        folder: folder of the files.
+    """
     dna = folder / "face.dna"
     face = small_face(head_grid=(5, 6))
     names = [PREFIX + n for n in EYES]
@@ -59,7 +63,12 @@ def _empty_action(item, name):
 
 
 def _key_sliders(item, **curves):
-    """Set keys of sliders in the assigned action. curves: control -> {frame: value}."""
+    """Insert keys of sliders into the assigned action, and set the sliders to 0.
+
+    Args:
+        item: control armature.
+        curves: short name of a slider -> {frame: value}.
+    """
     bone = item.pose.bones["face"]
     for short, keys in curves.items():
         for frame, value in keys.items():
@@ -69,14 +78,25 @@ def _key_sliders(item, **curves):
 
 
 def _key_weight(item, place, keys):
-    """Set keys of a layer's weight by its index, as versions up to commit 38364e4 did."""
+    """Insert keys of a layer's weight whose data path contains the index of the layer.
+
+    Versions of the add-on up to commit 38364e4 stored weights so.
+
+    Args:
+        item: control armature.
+        place: index of the layer.
+        keys: frame -> weight.
+    """
     for frame, value in keys.items():
         item.risorius_layers[place].weight = value
         item.keyframe_insert(f"risorius_layers[{place}].weight", frame=frame)
 
 
 def _three_layers(rig):
-    """Add layers of an action, an expression and idle life, without keys of sliders."""
+    """Add three layers: an action, an expression and idle life. Returns the control armature.
+
+    The control armature has no assigned action, so its sliders have no keys.
+    """
     item, layers_module = scene.controls(rig), scene.submodule("scene.animation.layers")
     item.risorius_layer_rules = False
     wave = _empty_action(item, f"Wave of {rig.name}")
@@ -89,7 +109,10 @@ def _three_layers(rig):
 
 
 def layers(dna, _folder):
-    """Layer weights have keyframes in the assigned action and in another one, or a driver."""
+    """Weights of two layers have keys in the assigned action and in another action.
+
+    The weight of the third layer has a driver.
+    """
     item = _three_layers(scene.load(dna, "LIVE"))
     other = _empty_action(item, "Other")
     _key_weight(item, 0, {1: 0.2, 20: 0.9})
@@ -134,7 +157,7 @@ def _strip(item, action, name="", **settings):
 
 
 def make_meta(item, strip):
-    """Put a strip into a meta strip; Blender does this only in an NLA editor."""
+    """Put an NLA strip into a meta strip; Blender's operator runs only in an NLA editor."""
     bpy.context.view_layer.objects.active = item
     item.select_set(True)
     for track in item.animation_data.nla_tracks:
@@ -188,7 +211,7 @@ def shared_action(dna, _folder):
 
 
 def nla(dna, _folder):
-    """NLA strips replace, add, fade or are muted; the active action adds to them."""
+    """NLA strips replace, add and fade, and one is muted; the active action adds to the strips."""
     item = _three_layers(scene.load(dna, "LIVE"))
     _strips(item)
     _empty_action(item, "On top")
@@ -212,7 +235,7 @@ def _strips(item):
 
 
 def baked_result(dna, _folder):
-    """The face is baked into strips of bones, keys and maps above muted tracks."""
+    """The result is baked: NLA strips of bones, shape keys and maps lie above muted tracks."""
     rig = scene.load(dna, "LIVE")
     item = _three_layers(rig)
     _strips(item)
@@ -234,7 +257,7 @@ def _own_joint(rig):
 
 
 def baked_controls(dna, _folder):
-    """The controls are baked into a strip above a muted track and a solo track."""
+    """The controls are baked into an NLA strip above a muted track and a solo track."""
     item = _three_layers(scene.load(dna, "KEYS"))
     _strips(item)
     item.animation_data.nla_tracks["Low"].is_solo = True
@@ -250,7 +273,7 @@ def _bake(item, kind):
 
 
 def shape_modes(dna, _folder):
-    """One face has live shape keys, the other a shape key per channel; both have a user's key."""
+    """One face is in the mode LIVE, the other in the mode KEYS; both have a shape key of a user."""
     for mode in ("LIVE", "KEYS"):
         rig = scene.load(dna, mode)
         item = scene.controls(rig)
@@ -267,7 +290,7 @@ def shape_modes(dna, _folder):
 
 
 def bones(dna, _folder):
-    """An action has keys of head, neck and eye bones, and of a slider that the eyes drive."""
+    """An action has keys of head, neck and eye bones, and of a slider that the gaze moves too."""
     rig = scene.load(dna, "LIVE")
     item = _three_layers(rig)
     _empty_action(item, "Bones")

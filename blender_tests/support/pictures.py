@@ -21,7 +21,7 @@ def small_render(camera, size=32):
 
 
 def pixels(path):
-    """RGBA values of all pixels of an image file, in one flat array."""
+    """The RGBA values of all pixels of an image file in a flat array, float64[4 * pixels]."""
     image = bpy.data.images.load(str(path))
     values = np.array(image.pixels[:])
     bpy.data.images.remove(image)

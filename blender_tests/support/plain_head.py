@@ -10,8 +10,8 @@ from . import scene
 from .egg import face_shapes
 
 METRES = 0.01
-# Landmarks of the head of face_shapes that the fake search finds, in cm with y up. The chin is
-# missing intentionally.
+# Landmarks that the fake search finds on the head of face_shapes, in cm with y up. The landmark
+# chin is missing, so that tests can place it.
 PLACES = {
     "eye_inner_L": (2.0, 3.0, 9.0),
     "eye_inner_R": (-2.0, 3.0, 9.0),
@@ -44,11 +44,11 @@ def plain_head(name="Egg"):
 
 
 class Package:
-    """Replaces the functions of scene/anyhead/finding.py that call risorius to find landmarks.
+    """Replaces the functions of scene/anyhead/finding.py that find landmarks by risorius.
 
     Attributes:
         places: name -> landmark that the fake search finds, in centimetres with y up.
-        heads: the finding.Head of each search.
+        heads: the finding.Head that each search got.
     """
 
     def __init__(self, monkeypatch):
@@ -65,16 +65,22 @@ class Package:
 
 
 def opened(positions):
-    """Displacements of the fake jawOpen: the lower half of the head moves down by 1 cm."""
+    """Displacements of a fake expression jawOpen, float64[V, 3] in cm.
+
+    The lower half of the head moves down by 1 cm.
+    """
     low = positions[:, 1] < positions[:, 1].mean()
     return low[:, None] * np.array([0.0, -1.0, 0.0])
 
 
 class Onto(Package):
-    """Also replaces the functions that transfer expressions (here only jawOpen) and conform a face.
+    """Also replaces the functions that transfer expressions to a head or conform a face to it.
+
+    The fake transfer gives the head only the expression jawOpen.
 
     Attributes:
-        asked: (template's Dna, Transfer) of each transfer, (Dna, finding.Head) of each conforming.
+        asked: arguments of the calls: (Dna of the template, Transfer) for each transfer, (Dna,
+            finding.Head) for each conform.
     """
 
     def __init__(self, monkeypatch):

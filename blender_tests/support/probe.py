@@ -8,14 +8,17 @@ import numpy as np
 
 
 class Probe(bpy.types.RenderEngine):
-    """Records vertices from the depsgraph of a render, also between frames as for motion blur."""
+    """A render engine that records the vertices of faces at each rendered frame.
+
+    It can also record them between frames, as motion blur does.
+    """
 
     bl_idname = "RISORIUS_TEST_PROBE"
     bl_label = "Probe"
     bl_use_preview = False
 
-    # frame -> {mesh index: float64[V, 3] in world space}. With `between`, the frame is recorded
-    # again at the end, as frame + 1e-9.
+    # Frame -> {index of a mesh in the DNA file: vertices float64[V, 3] in world space}. If
+    # `between` is not empty, the frame is recorded again after the offsets, as frame + 1e-9.
     seen = {}
     between = ()  # offsets from the frame, in frames, at which the engine also records
 
@@ -48,11 +51,11 @@ def _vertices(item):
 
 @contextmanager
 def rendering(setup, between=()):
-    """Context manager: renders of a scene use the probe. Yields the dict that they fill.
+    """Context manager in which renders of a scene use the probe. Yields the dict that it fills.
 
     Args:
         setup: the scene.
-        between: offsets in frames at which vertices are recorded too.
+        between: offsets from each rendered frame, in frames, at which vertices are recorded too.
     """
     bpy.utils.register_class(Probe)
     before = setup.render.engine

@@ -8,9 +8,9 @@ process.
     meshes       name -> points [V][3] at rest, material, colors [V][4] if it has a texture
     names        names of all other elements: armatures, bones, shape keys, takes
     opaque       material -> whether it is opaque; empty for Alembic
-    begin, end   range of the animation in seconds; FBX: from 0
-    up, metres   up axis, and metres per unit; read from USD files only, otherwise the convention
-                 of the format
+    begin, end   range of the animation in seconds; in FBX files it begins at 0
+    up, metres   up axis, and metres per unit; only USD files state them, for other formats they
+                 are the convention of the format
 """
 
 import base64
@@ -25,7 +25,7 @@ import numpy as np
 
 
 def _colors(picture, uvs):
-    """Colours of a picture at UV coordinates, [V][4] in 0 to 1; v increases upwards."""
+    """The RGBA colours of a picture at UV coordinates, [V][4], 0 to 1; v increases upwards."""
     from PIL import Image
 
     with Image.open(picture) as image:
@@ -68,7 +68,7 @@ def gltf(path):
 
 
 def _tree(content):
-    """The JSON object of a .glb file's bytes."""
+    """The JSON object in the bytes of a .glb file."""
     return json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])
 
 

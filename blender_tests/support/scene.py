@@ -19,7 +19,13 @@ def submodule(name):
 
 
 def load(path, mode="AUTO", **options):
-    """Import a DNA file. Returns the deforming armature."""
+    """Import a DNA file. Returns the deforming armature.
+
+    Args:
+        path: path of the DNA file.
+        mode: shape mode: "AUTO" (Direct mode), "LIVE" or "KEYS".
+        options: other properties of the import operator.
+    """
     before = set(bpy.data.objects)
     assert bpy.ops.risorius.import_dna(filepath=str(path), shape_mode=mode, **options) == {
         "FINISHED"
@@ -28,7 +34,11 @@ def load(path, mode="AUTO", **options):
 
 
 def add_board(kind="COMPLETE"):
-    """Add a board to the active face, and return to object mode."""
+    """Add a face board to the active face, and return to object mode.
+
+    Args:
+        kind: kind of the board, "COMPLETE" or "PRIMARY".
+    """
     assert bpy.ops.risorius.add_board(kind=kind) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
 
@@ -44,7 +54,7 @@ def face(rig):
 
 
 def meshes(rig):
-    """DNA mesh index -> mesh object of a face."""
+    """The mesh objects of a face: index of the mesh in the DNA file -> object."""
     found = [rig[k] for k in rig.keys() if k.startswith("risorius_mesh_")]  # noqa: SIM118
     return {o["dna_mesh"]: o for o in found}
 
@@ -57,7 +67,12 @@ def update(*items):
 
 
 def set_controls(rig, **values):
-    """Set sliders of a face and evaluate the scene. values: end of a slider's name -> value."""
+    """Set sliders of a face and evaluate the scene.
+
+    Args:
+        rig: deforming armature of the face.
+        values: end of a slider's name -> value.
+    """
     bone = face(rig)
     for end, value in values.items():
         name = next(k for k in bone.keys() if k.endswith(end))  # noqa: SIM118
@@ -77,7 +92,12 @@ def evaluated(item):
 
 
 def raw_of(rig, path):
-    """Raw control values of a face's sliders, float32[R]. path: its DNA file."""
+    """The values of a face's sliders in the order of the raw controls, float32[R].
+
+    Args:
+        rig: deforming armature of the face.
+        path: path of the face's DNA file.
+    """
     labels = submodule("logic.base.names").unique_labels(risorius.load(str(path)).raw_control_names)
     return np.array([float(face(rig)[n]) for n in labels], np.float32)
 
@@ -85,7 +105,7 @@ def raw_of(rig, path):
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
     """Largest coordinate difference between Blender's and the oracle's vertices of a face.
 
-    The difference is divided by the size of the mesh. The armature may have any transform.
+    The difference is a share of the size of the mesh. The armature may have any transform.
 
     Args:
         rig: deforming armature.
@@ -108,7 +128,7 @@ def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
 
 
 def curves(item):
-    """The F-curves of an object's assigned action, in Blender with or without action slots."""
+    """The F-curves of an object's assigned action, whether Blender has action slots or not."""
     data = item.animation_data
     if hasattr(data, "action_slot"):
         bags = (s.channelbag(data.action_slot) for s in data.action.layers[0].strips)
@@ -128,7 +148,7 @@ def snapshot(rig):
 
 
 def counts():
-    """Type of datablock -> number of its datablocks in the .blend."""
+    """Type of data-block -> number of such data-blocks in the open .blend file."""
     return {
         p.identifier: len(getattr(bpy.data, p.identifier))
         for p in bpy.data.bl_rna.properties
@@ -137,9 +157,10 @@ def counts():
 
 
 def invalid_drivers():
-    """(owner's name, data path) of each invalid driver in the .blend, and the number of drivers.
+    """The invalid drivers of objects, shape keys and node trees of materials.
 
-    Owners are objects, shape keys and node trees of materials.
+    Returns (name of the owner, data path) of each invalid driver, and the number of all drivers of
+    these owners in the .blend file.
     """
     owners = [
         *bpy.data.objects,

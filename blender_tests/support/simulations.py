@@ -13,7 +13,10 @@ FREE = 2e-3  # tolerance relative to the mesh's size if some cloth is free
 
 
 def film(item, frames=FRAMES):
-    """Record a mesh: frame -> evaluated vertices at this frame (here called a film)."""
+    """Record a mesh object: frame -> vertices at this frame in world space, float64[V, 3].
+
+    Such a record is called a film here.
+    """
     found = {}
     for frame in frames:
         bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
@@ -22,18 +25,20 @@ def film(item, frames=FRAMES):
 
 
 def apart(film, wanted):
-    """The largest coordinate difference between two films, divided by the mesh's size."""
+    """The largest coordinate difference between two films, as a share of the mesh's size."""
     size = np.ptp(wanted[min(wanted)], axis=0).max()
     return max(float(np.abs(film[f] - wanted[f]).max()) for f in wanted) / size
 
 
 def moving(dna_file, mode, far=0.2):
-    """(armature, DNA mesh 0) of a face with keys of sliders, head bone and its controls' place.
+    """Import a face, and set keys of sliders, of the head bone and of the control armature's place.
+
+    Returns the deforming armature, and the object of mesh 0.
 
     Args:
         dna_file: path of the DNA file.
         mode: shape mode of the import.
-        far: distance in x by which the controls move, in Blender units.
+        far: distance along x by which the control armature moves, in Blender units.
     """
     rig = scene.load(dna_file, mode)
     controls = animate(rig)
@@ -46,7 +51,12 @@ def moving(dna_file, mode, far=0.2):
 
 
 def cloth(item, pinned=1.0):
-    """Add a cloth modifier; the uppermost fraction `pinned` of the vertices cannot move."""
+    """Add a cloth modifier to a mesh, and return the modifier.
+
+    Args:
+        item: the mesh object.
+        pinned: share of the vertices that are pinned, from the top downwards.
+    """
     group = item.vertex_groups.new(name="pins")
     height = np.array([v.co.z for v in item.data.vertices])
     held = np.flatnonzero(height >= np.quantile(height, 1.0 - pinned))
@@ -60,7 +70,11 @@ def cloth(item, pinned=1.0):
 
 
 def mean_places(places):
-    """The film that `trail` should give. places: film of the vertices before the modifier."""
+    """The film of a mesh that `trail` moves.
+
+    Args:
+        places: film of the same mesh without `trail`.
+    """
     found, state = {}, None
     for frame in sorted(places):
         state = places[frame] if state is None else (state + places[frame]) / 2
@@ -69,7 +83,11 @@ def mean_places(places):
 
 
 def trail(item):
-    """Add simulation nodes that move vertices halfway to the modifier's input in each step."""
+    """Add simulation nodes that lag behind a mesh.
+
+    At each frame, each vertex moves half of the way from its last place to its place without the
+    nodes.
+    """
     tree = bpy.data.node_groups.new("Trail", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -105,7 +123,12 @@ def trail(item):
 
 
 def scarf(item, kind):
-    """A sheet that follows a mesh by a modifier: SURFACE_DEFORM or SHRINKWRAP."""
+    """Add a sheet in front of a mesh that follows the mesh by a modifier.
+
+    Args:
+        item: object of the mesh.
+        kind: type of the modifier, "SURFACE_DEFORM" or "SHRINKWRAP".
+    """
     points = np.array([v.co for v in item.data.vertices]) @ np.array(item.matrix_world)[:3, :3].T
     points += np.array(item.matrix_world)[:3, 3]
     low, high = points.min(axis=0), points.max(axis=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random actions of a user on faces, and the checks after each action."""
+"""Random actions of a user on faces, and the checks of the faces in between."""
 
 import hashlib
 import random
@@ -49,7 +49,10 @@ class World:
     # -- the file ---------------------------------------------------------------------------
 
     def begin(self):
-        """Save a library with a character, then a file with characters and an undo step."""
+        """Save a library file with one character, then make and save the file of the run.
+
+        The file of the run has `characters` characters, and one undo step.
+        """
         self._enable()
         bpy.ops.wm.read_homefile(use_empty=True)
         self._import("LIVE" if self.random.random() < 0.5 else "KEYS")
@@ -74,7 +77,7 @@ class World:
 
     @staticmethod
     def rigs():
-        """The scene's own (not linked) armatures of faces, sorted by name."""
+        """The deforming armatures of the scene's faces, sorted by name, without linked faces."""
         inside = bpy.context.scene.objects
         found = [o for o in inside if o.library is None and o.get("risorius_controls")]
         return sorted(found, key=lambda o: o.name)
@@ -84,7 +87,10 @@ class World:
 
     @staticmethod
     def _meshes(rig):
-        """DNA mesh index -> mesh of this rig; partial copies also refer to other rigs' meshes."""
+        """Index of a mesh in the DNA file -> mesh object of this rig.
+
+        A partial copy of a face also refers to meshes of the original; these are left out.
+        """
         held = [rig[k] for k in rig.keys() if k.startswith("risorius_mesh_")]  # noqa: SIM118
         own = [m for m in held if m is not None and m.get("risorius_rig") == rig]
         return {m["dna_mesh"]: m for m in own}
@@ -183,7 +189,7 @@ class World:
         return body
 
     def test_channel(self):
-        """Test a shape channel, and end the test by the operator or by a change of the frame."""
+        """Test blend shape channel 1, and end the test by the operator or by another frame."""
         self._activate(self._rig())
         bpy.ops.risorius.test_channel(channel="1", value=self.random.random())
         if self.random.random() < 0.5:
@@ -268,15 +274,19 @@ class World:
             self._delete(self._rig())
 
     def _delete(self, rig):
-        """Delete a rig: by Blender's operator, with its data, or with its override's collection."""
+        """Delete a rig with its meshes, in a random way: by the operator Delete, or from the file.
+
+        Objects of a library override are removed from the file, with the override's collection.
+        """
         objects = self._objects(rig)
         controls = rig["risorius_controls"]
         if any(r != rig and r["risorius_controls"] == controls for r in self.rigs()):
             objects.remove(controls)
         if rig.override_library:
-            # Blender creates objects of an override again if its collection remains.
+            # Blender would create the objects of an override again if the override's collection
+            # remained.
             root = rig.override_library.hierarchy_root
-            # A copy of an override has the same root collection, but is not inside of it.
+            # A copy of an override has the same root collection as the override, but is not in it.
             whole = isinstance(root, bpy.types.Collection) and rig in root.all_objects[:]
             bpy.data.batch_remove([*objects, root] if whole else objects)
         elif self.random.random() < 0.5:
@@ -316,7 +326,7 @@ class World:
             bpy.ops.risorius.reload()
 
     def replace(self):
-        """Replace a rig's DNA by the same file, or by a file with other axes and shapes."""
+        """Replace the DNA file of a rig by the same file, or by a file with other axes."""
         rig = self._rig()
         if not rig.override_library:
             self._activate(rig)
@@ -372,7 +382,7 @@ class World:
         self._push("loaded")
 
     def revert(self):
-        """Revert to the last saved file."""
+        """Open the file of the run as it was last saved."""
         bpy.ops.wm.open_mainfile(filepath=str(self.blend))
         self._settings()
         self._push("reverted")
@@ -428,7 +438,7 @@ class World:
         An override that Blender has locked is first repaired by the panel's operator.
 
         Returns:
-            The largest error, relative to the mesh's size.
+            The largest coordinate difference from the oracle, as a share of the mesh's size.
 
         Raises:
             WrongFaceError: a driver is invalid, no face is left, or a face differs by TOLERANCE or
@@ -444,8 +454,8 @@ class World:
         for rig in rigs:
             error, where = self._error(rig)
             if not error < scene.TOLERANCE and scene.submodule("scene.frame.evaluate").refused(rig):
-                # Blender has locked an override. The panel says so and has a button, which this
-                # calls.
+                # Blender has made parts of an override read-only. The panel Face says so and has a
+                # button for the repair; this call does what the button does.
                 self._activate(rig)
                 bpy.ops.risorius.make_override()
                 self.repaired += 1
@@ -456,9 +466,11 @@ class World:
         return worst
 
     def _error(self, rig):
-        """(largest difference from the oracle / size of the mesh, name of the mesh).
+        """The largest error of a rig, and the name of the mesh that has it.
 
-        The name is "its place" if the matrices of rig and controls differ more, in Blender units.
+        The error of a mesh is its largest coordinate difference from the oracle, as a share of its
+        size. If the world matrices of rig and controls differ by more, the error is this
+        difference, in Blender units, and the name is "its place".
         """
         dna, evaluator, _ = self._oracles[rig["risorius_dna"]["risorius_hash"]]
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -480,7 +492,10 @@ class World:
         return worst
 
     def calm(self):
-        """Before a sample of memory: restore the initial number of characters, save and reload."""
+        """Prepare for a sample of memory.
+
+        Restore the initial number of characters, remove their animation, save and reload.
+        """
         while len(self.rigs()) > self.characters:
             self._delete(self.rigs()[-1])
         while len(self.rigs()) < self.characters:
@@ -492,24 +507,25 @@ class World:
         self.save_and_load()
 
     def leftovers(self):
-        """Type of data -> number of datablocks after all characters were deleted; it must not grow.
+        """Delete all characters, and count the data-blocks that are left: type -> number.
 
-        Opens the file again afterwards.
+        The numbers must not grow during a run. Afterwards the file of the run is opened again.
         """
         for rig in self.rigs():
             self._delete(rig)
         self.purge_all()
         bpy.ops.wm.save_as_mainfile(filepath=str(self.folder / "empty.blend"))  # drops unused data
         self.purge_all()
-        # Linked data do not count, because parts that refer to each other stay until a file is
-        # opened.
+        # Linked data-blocks are not counted: if they refer to each other, Blender keeps them until
+        # another file is opened.
         kinds = [p for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
         local = {
             p.identifier: [i for i in getattr(bpy.data, p.identifier) if not i.library]
             for p in kinds
             if p.identifier != "libraries"
         }
-        # Texts with reports of the add-on stay for the user, and do not count.
+        # Reports of the add-on are texts that stay for the user, so only texts with DNA data are
+        # counted.
         local["texts"] = [t for t in local["texts"] if "risorius_bytes" in t]
         counts = {name: len(found) for name, found in local.items()}
         bpy.ops.wm.open_mainfile(filepath=str(self.blend))
@@ -518,12 +534,12 @@ class World:
         return counts
 
     def purge_all(self):
-        """Remove empty collections, and data without users."""
+        """Remove empty collections, and data-blocks without users."""
         bpy.data.batch_remove([c for c in bpy.data.collections if not c.all_objects])
         self.purge()
 
 
-# Action -> its frequency relative to others.
+# Name of an action -> how often it is chosen, relative to the other actions.
 WEIGHTS = {
     "slider": 300, "frame": 130, "key": 60, "undo": 80, "redo": 50, "select": 60, "lod": 50,
     "shape_mode": 40, "reset": 20, "overdrive": 20, "own_key": 20, "drop_own_key": 20,

@@ -45,7 +45,7 @@ OPERATIONS = {
     "origin to the centre of volume": lambda: ORIGIN(type="ORIGIN_CENTER_OF_VOLUME"),
 }
 SELECTIONS = ("controls", "rig", "one mesh", "all")
-# Steps that Blender refuses on library data.
+# Steps of OPERATIONS that Blender refuses on data-blocks that are linked from a library.
 REFUSED_ON_LINKED_DATA = ("apply all", "geometry to origin", "origin to the cursor")
 
 
@@ -73,7 +73,10 @@ def _objects(rig):
 
 
 def _parts(rig):
-    """(object, kind) -> value, for all values that these steps of Blender may change."""
+    """(name of an object, kind of value) -> values that the steps of OPERATIONS may change.
+
+    The kinds are matrices, rest matrices and lengths of bones, vertices, and points of shape keys.
+    """
     found = {}
     for item in _objects(rig):
         found[item.name, "matrix"] = np.array(item.matrix_basis)
@@ -95,7 +98,12 @@ def _update():
 
 
 def _hang(parent, bone=""):
-    """Add an empty, as a user would, whose parent is an object or a bone of the face."""
+    """Add an empty, such as a hat of a user, whose parent is an object or a bone of it.
+
+    Args:
+        parent: an object of the face.
+        bone: name of a bone of `parent`; "": the object itself is the parent.
+    """
     hat = bpy.data.objects.new("Hat", None)
     bpy.context.scene.collection.objects.link(hat)
     hat.parent, hat.parent_type, hat.parent_bone = parent, "BONE" if bone else "OBJECT", bone
@@ -104,7 +112,7 @@ def _hang(parent, bone=""):
 
 
 def _put(rig, jaw):
-    """Move the jaw and update, so that delayed work of the add-on is done."""
+    """Set the jaw slider and update twice, so that work that the add-on delays is done."""
     scene.set_controls(rig, jawOpen=jaw)
     scene.update(scene.controls(rig))
 
@@ -114,7 +122,13 @@ def _far(before, now):
 
 
 def _try(rigs, hats, steps):
-    """Do steps on the first face; after each, all faces and attached empties must be as before."""
+    """Do steps on the first face, and check that all is as before after each step.
+
+    Args:
+        rigs: the faces whose vertices and data are compared.
+        hats: empties that are attached to the first face and must stay in place.
+        steps: (key of SELECTIONS, key of OPERATIONS).
+    """
     first = rigs[0]
     wanted, whole = {}, {}
     for jaw in (0.2, 0.7):
@@ -138,7 +152,7 @@ def _try(rigs, hats, steps):
 
 
 def _replaced(rig, tmp_path):
-    """Replace the DNA file of a face after the steps, and compare the face with the new file."""
+    """Replace the DNA file of a face on which steps were done, and compare it with the oracle."""
     path = tmp_path / "other.dna"
     other_face(head_grid=(6, 7)).save(str(path))
     bpy.context.view_layer.objects.active = scene.controls(rig)
@@ -180,7 +194,10 @@ def test_the_main_steps_on_a_face_on_a_body_with_keys_of_its_own(small_file, tmp
 
 
 def _on_a_body(path):
-    """(armature, controls) of a face in the mode KEYS on the only bone of a rotated body."""
+    """Attach a face in the mode KEYS to the only bone of a rotated body.
+
+    Returns the deforming armature and the control armature of the face.
+    """
     rig = scene.load(path, "KEYS")
     controls = scene.controls(rig)
     controls.scale = (1.5, 1.5, 1.5)

@@ -33,9 +33,10 @@ def test_all_drivers_are_valid_after_import(mode, dna_file):
 
 
 def _same(found, wanted, mode):
-    """Compare vertices: in Direct mode up to the last bits, in other modes exactly.
+    """Check that vertices are equal: up to the last bits in Direct mode, exactly in other modes.
 
-    Without the add-on, Blender deforms a face of Direct mode by its bones, which rounds otherwise.
+    While the add-on is disabled, Blender deforms a face of Direct mode by its bones, and so rounds
+    its vertices in another way.
     """
     near = 1e-6 if mode == "AUTO" else 0.0
     np.testing.assert_allclose(found, wanted, rtol=0, atol=near)

@@ -12,7 +12,10 @@ JAW = "CTRL_expressions.jawOpen"
 
 @pytest.fixture
 def library(dna_file, tmp_path, mode):
-    """(path of a .blend with a posed character, its vertices); the open file is empty."""
+    """The path of a .blend file with a posed character, and the character's vertices.
+
+    The open file is a new, empty file.
+    """
     rig = scene.load(dna_file, mode)
     scene.set_controls(rig, jawOpen=0.8, mouthCornerPullL=0.5, browDownL=1.0)
     path = tmp_path / f"library_{mode}.blend"
@@ -23,7 +26,13 @@ def library(dna_file, tmp_path, mode):
 
 
 def _link(path, instance=True):
-    """Link the collection. Returns the new active object: the instance, or the controls."""
+    """Link the character's collection from a .blend file. Returns the new active object.
+
+    Args:
+        path: path of the .blend file.
+        instance: True: link it as a collection instance, which is the active object; False: link
+            its objects; the control armature is the active object.
+    """
     bpy.ops.wm.link(
         directory=f"{path}/Collection/", filename="Small", instance_collections=instance
     )
@@ -134,7 +143,7 @@ def test_override_moves_and_survives_save(library, dna_file, tmp_path, instance,
 
 
 def _edit_library(path):
-    """Open the library, change colours of two materials, save it, and open the file again."""
+    """Change the colours of two materials in the library file, and return to the open file."""
     here = bpy.data.filepath
     bpy.ops.wm.open_mainfile(filepath=str(path))
     bpy.data.materials["Small_head"].diffuse_color = (0.1, 0.9, 0.2, 1.0)
@@ -221,7 +230,12 @@ def test_override_stands_where_the_instance_stood(library, dna_file):
 
 
 def _system_override(path, editable):
-    """An override made by Blender without the add-on; only if `editable` all parts are editable."""
+    """Make a library override by Blender, without the add-on. Returns the deforming armature.
+
+    Args:
+        path: path of the library file.
+        editable: True: all parts are editable; False: no part is.
+    """
     item = _link(path)
     item.instance_collection.override_hierarchy_create(
         bpy.context.scene, bpy.context.view_layer, reference=item, do_fully_editable=editable
@@ -245,7 +259,10 @@ def test_system_override_is_noticed_and_repaired(library, dna_file):
 
 
 def test_refused_live_key_is_noticed_and_repaired(library, dna_file, mode):
-    """Overrides made by Blender's own menu have editable armatures and read-only meshes."""
+    """If the meshes of an override are read-only, the panel says so, and its button repairs it.
+
+    Blender's own menu makes such overrides, with editable armatures.
+    """
     rig = _system_override(library[0], editable=False)
     for item in (rig, scene.controls(rig)):
         item.override_library.is_system_override = False

@@ -10,7 +10,7 @@ from support.layout import drawn
 
 @pytest.fixture
 def rig(dna_file, mode):
-    """A posed character, and an undo step with it."""
+    """A posed character; an undo step with the posed character was pushed."""
     bpy.context.preferences.edit.use_global_undo = True
     made = scene.load(dna_file, mode)
     scene.set_controls(made, jawOpen=0.8, mouthCornerPullL=0.5)
@@ -30,7 +30,11 @@ def _said(active):
 
 
 def _use(active):
-    """Play frames, and call all operators of ui.face.operators that can be used now."""
+    """Show two frames, and call each operator of ui.face.operators that is available.
+
+    Args:
+        active: the object that is made active.
+    """
     bpy.context.view_layer.update()
     for frame in (2, 3):
         bpy.context.scene.frame_set(frame)
@@ -115,7 +119,11 @@ def _delete(objects):
 
 
 def test_deleted_parts_are_brought_back(rig, dna_file):
-    """Blender's Delete removes a part only from the scene, while other parts still refer to it."""
+    """A deleted part that is still in the .blend file is brought back to the scene.
+
+    Blender's Delete removes a part from the scene, but not from the file, because other parts of
+    the face still refer to it.
+    """
     _delete([scene.controls(rig)])
     _use(rig)
     assert "still in the file" in _said(rig)
@@ -181,7 +189,10 @@ def _writer(rig):
 
 
 def test_a_step_of_a_slider_is_no_edit_of_the_bones(rig, dna_file):
-    """The sidebar tags the armature for an update too, but cached data of bones remain valid."""
+    """The data of bones that the add-on has cached stay in use if a slider is moved.
+
+    A slider of the sidebar tags the whole armature as changed, as an edit of bones does.
+    """
     controls = scene.controls(rig)
     bpy.context.view_layer.update()
     scene.set_controls(rig, jawOpen=0.1)

@@ -114,7 +114,10 @@ def test_a_form_that_is_no_number_counts_as_none(rubbish):
 
 
 def test_an_old_bake_whose_tracks_are_gone_is_brought_up(capsys):
-    """An old bake refers to NLA tracks by index. If the tracks are gone, its list becomes empty."""
+    """A bake of an older version, which stores its muted tracks by index, is updated.
+
+    If the NLA tracks do not exist any more, the list of tracks becomes empty.
+    """
     with bpy.data.libraries.load(str(FOLDER / "baked_controls.blend")) as (there, into):
         into.objects = [name for name in there.objects if name.endswith("_controls")]
     controls = into.objects[0]

@@ -13,8 +13,8 @@ import pytest
 from support import past
 
 NEAR = 1e-5  # tolerance as a share of a mesh's size
-# Files whose first face is never in Direct mode, because of keyframes of joints, a shape key per
-# channel, or an override.
+# Files whose face Small_rig is never in Direct mode, because its joints have keyframes, it has a
+# shape key for each channel, or it is a library override.
 ORDINARY = ("baked_result", "baked_controls", "overridden_live", "overridden_keys")
 
 MAKERS = sorted(p.name for p in past.DATA.iterdir() if p.is_dir())
@@ -27,8 +27,14 @@ def _same_on_every_processor():
 
 
 def folder_of(maker, tmp_path):
-    """A copy of the folder of the files that a Blender version saved. The test is skipped if
-    the running Blender has a lower major version."""
+    """A copy of the folder with files that an older Blender saved.
+
+    The test is skipped if the running Blender has a lower major version than `maker`.
+
+    Args:
+        maker: version of the Blender that saved the files, such as "4.2.23".
+        tmp_path: folder for the copy.
+    """
     made_by = tuple(int(n) for n in maker.split("."))
     if made_by[0] > bpy.app.version[0]:
         pytest.skip(
@@ -38,7 +44,13 @@ def folder_of(maker, tmp_path):
 
 
 def assert_same(found, wanted, where):
-    """Check that two recordings made by past.film are equal bit for bit."""
+    """Check that a recording of past.film equals a stored recording bit for bit.
+
+    Args:
+        found: the recording.
+        wanted: the stored recording, with flat arrays.
+        where: "name/route/play", for the message of a failure.
+    """
     assert found.keys() == wanted.keys(), where
     for name, values in wanted.items():
         flat = np.ascontiguousarray(found[name]).ravel()
@@ -47,9 +59,13 @@ def assert_same(found, wanted, where):
 
 
 def assert_same_in_direct_mode(where):
-    """Compare the vertices of all frames in Automatic and in Live mode; Live mode remains set.
+    """Check that faces have the same vertices in Direct and in Live mode at all frames.
 
-    Checks also which faces Automatic puts into Direct mode.
+    Also check which faces are in Direct mode if the mode is Automatic. Afterwards all faces are in
+    Live mode.
+
+    Args:
+        where: "name/route/play" of the open file.
     """
     name, route, _play = where.split("/")
     may_be = name not in ORDINARY and route not in ("link", "override")

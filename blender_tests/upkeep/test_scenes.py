@@ -34,7 +34,10 @@ def _play(rig, *frames):
 
 @pytest.mark.parametrize("how", ["hide_viewport", "hide_set", "collection", "layer"])
 def test_hidden_controls_still_move_the_face(rig, how):
-    """Blender evaluates hidden objects only if a visible object depends on them."""
+    """A hidden control armature still moves the face, however it is hidden.
+
+    Blender evaluates a hidden object only if a visible object depends on it.
+    """
     wanted = _play(rig, 10, 1, 5)
     controls = scene.controls(rig)
     if how in ("collection", "layer"):
@@ -65,7 +68,7 @@ def _small_render(setup):
 
 
 def _rendered(rig, folder, setup):
-    """Frame -> values of the shape channels, read while the frames are rendered."""
+    """Render frames, and read the blend shape channels meanwhile: frame -> values."""
     found = {}
     meshes = [m for _, m in sorted(scene.meshes(rig).items())]
 
@@ -112,7 +115,7 @@ def test_render_of_a_scene_that_is_not_open(rig, tmp_path):
 
 
 def test_saved_with_another_scene_open(rig, dna_file, tmp_path):
-    """A character in a scene that is not open is not updated, but is right once it is opened."""
+    """A character in a scene that is not shown is not updated; it is right when shown again."""
     wanted = _play(rig, 1, 10)
     bpy.context.window.scene = bpy.data.scenes.new("A other")
     bpy.context.view_layer.update()

@@ -17,7 +17,7 @@ def _rigs():
 
 
 def _state():
-    """Character -> evaluated vertices of its visible meshes at the current frame."""
+    """Name of a character -> vertices of its visible meshes at the current frame."""
     bpy.context.view_layer.update()
     found = {}
     for rig in _rigs():
@@ -31,8 +31,10 @@ def _activate(rig):
 
 
 def _slide(chance, rig):
-    """Move a slider, but not jawOpen: jawOpen has keyframes, so that Blender would reset the
-    change to the value of the F-curve."""
+    """Move a random slider, except jawOpen.
+
+    jawOpen has keyframes, so Blender would set it back to the value of its F-curve.
+    """
     name = chance.choice(("mouthCornerPullL", "mouthCornerPullR", "browDownL", "eyeLookUpL"))
     scene.set_controls(rig, **{name: chance.random()})
 

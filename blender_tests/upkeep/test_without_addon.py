@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from support import scene
 
-# Code that runs in a Blender with factory settings: it stores the vertices, changes a slider, and
-# saves the file.
+# Code that runs in a Blender with factory settings, and so without the add-on. It writes the
+# vertices of the face to a file, changes a slider, and saves the .blend file.
 _OTHER = """
 import sys, os
 import bpy, numpy as np
@@ -41,7 +41,10 @@ os._exit(0)
 
 
 def _in_another_blender(blend, folder):
-    """Open, change and save a file in a Blender without the add-on. Returns its vertices."""
+    """Open a .blend file in a Blender without the add-on, and change and save it there by _OTHER.
+
+    Returns the vertices that this Blender has shown before the change.
+    """
     script, out = folder / "other.py", folder / "shown.npy"
     script.write_text(_OTHER, encoding="utf-8")
     environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "nobody"))

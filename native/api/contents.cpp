@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The contents of a face: names, joints, meshes and their shapes, as views into it.
+// The contents of a face: names, joints, meshes and their shapes. All pointers that these functions
+// give point into the face.
 #include <span>
 #include <string>
 #include <vector>
@@ -54,8 +55,8 @@ risorius_status refuse_index(const char* argument, std::uint32_t found, std::siz
   });
 }
 
-// A mesh of a face, without content if it was not read. Null, with the last error set, if the face
-// is null or has no mesh of this index.
+// A mesh of a face; a mesh whose geometry was not read is empty. Null, with the last error set, if
+// the face is null or has no mesh with this index.
 const dna::Mesh* mesh_of(const risorius_face* face, std::uint32_t index) {
   if (face == nullptr) return (void)refuse("face", "a face was expected, found NULL"), nullptr;
   const std::size_t count = face->face->dna.definition.mesh_names.size();

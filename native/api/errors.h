@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Error handling of the C API: nothing is thrown, and each thread remembers its last error.
+// Error handling of the C API: its functions throw nothing, and each thread has a last error of its
+// own.
 #pragma once
 
 #include <new>
@@ -11,7 +12,7 @@
 namespace risorius::api {
 
 /// Stores an error as the last error of this thread, for risorius_last_error. Never throws: if
-/// memory is short the texts are lost, but not the status.
+/// there is no memory for the error's texts, the texts are lost, but not the status.
 /// In:  file  the path as the caller gave it, or ""
 /// Out: the risorius_status for the error's code
 risorius_status remember(const core::Error& error, std::string_view file = {}) noexcept;
@@ -22,8 +23,9 @@ risorius_status remember(const core::Error& error, std::string_view file = {}) n
 /// Out: RISORIUS_BAD_ARGUMENT
 risorius_status refuse(std::string_view argument, std::string_view message) noexcept;
 
-/// Store a lack of memory, or an unexpected exception, as the last error of this thread, and return
-/// its status. The texts of these errors are constants, because allocating memory could fail again.
+/// Store an error as the last error of this thread, and return its status: out_of_memory a lack of
+/// memory, internal an unexpected exception. The texts of these errors are constants, because
+/// allocating memory could fail again.
 risorius_status out_of_memory() noexcept;
 risorius_status internal() noexcept;
 

@@ -79,8 +79,9 @@ compile::CompileOptions compile_options(const risorius_options& options) {
   return out;
 }
 
-// Fails if the caller asks for a LOD that the file does not have. The parser does not fail: it
-// ignores such LODs, as the DNA format's own filter does, if the file has one of the others.
+// Fails if the caller asks for a LOD that the file does not have. The parser does not fail if the
+// file has at least one of the asked LODs: it ignores the missing ones, as the reader of the DNA
+// format's own library does.
 Status has_all_lods(const risorius_options& options, const dna::Dna& dna) {
   std::vector<std::uint16_t> asked(options.lods, options.lods + options.lod_count);
   const std::size_t found = dna.descriptor.lod_count;

@@ -34,8 +34,8 @@ struct risorius_instance {
   rig::Workspace work;
   rig::Pose pose;                       // of RISORIUS_SETTLED
   std::optional<rig::Instance> latent;  // of RISORIUS_LATENT; has a pose of its own
-  // The pose inside `latent` after its first evaluation. Null before, and always with
-  // RISORIUS_SETTLED: values are then read from `pose`.
+  // The pose inside `latent`, after the first evaluation with RISORIUS_LATENT. Null before, and
+  // always with RISORIUS_SETTLED; while it is null, values are read from `pose`.
   const rig::Pose* evaluated = nullptr;
 };
 
@@ -60,7 +60,8 @@ const std::vector<float>* values_of(const risorius_instance& instance, risorius_
   }
 }
 
-// Sets the raw controls that the table of GUI controls writes. Other raw controls do not change.
+// Sets the raw controls that GUI controls drive, by the face's table from GUI to raw controls.
+// Other raw controls do not change.
 void apply_table(risorius_instance& instance) {
   rig::gui_to_raw(instance.face->rig, instance.gui.data(), instance.from_gui.data());
   for (std::size_t i = 0; i < instance.raw.size(); ++i) {

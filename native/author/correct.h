@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Faults of the skin where expressions meet, and the smallest motion that repairs them.
+// Faults of the skin in poses that combine expressions, and the smallest motion that repairs them.
 //
 // Sources: Bouaziz, Martin, Liu, Kavan and Pauly, "Projective Dynamics" (2014): each round finds a
 // new goal for each faulty vertex, and one sparse system joins all goals; Sorkine et al.,
@@ -36,11 +36,11 @@ struct SkinPose {
   std::vector<std::vector<Vector3>> solids;  // [solids][vertices]
 };
 
-/// The faults of a pose. To merge the faults of two poses, take the larger depth and stretch and
-/// the smaller fold of each entry.
+/// The faults of a pose. To merge the faults of two poses, take for each vertex the larger depth,
+/// for each face the larger stretch, and for each edge the smaller fold.
 struct SkinFaults {
-  // [V] mm inside a solid or the skin itself; 0: outside, not shown, or deeper than 6 mm in a solid
-  // or 4 mm in the skin.
+  // [V] depth of a vertex in mm inside a solid or inside the skin; 0 if it is outside, cannot be
+  // seen, or is deeper than 6 mm in a solid or 4 mm in the skin.
   std::vector<float> depth;
   std::vector<float> stretch;  // [F] area divided by the neutral area
   std::vector<float> fold;     // [edges of two faces] cosine between the normals of the two faces
@@ -92,7 +92,7 @@ class SkinChecker {
   /// [V] whether a vertex can be seen. Only these vertices have to stay outside of solids.
   const std::vector<bool>& shown() const;
   /// Finds the faults of a pose.
-  /// Fails: kInvalidLength, kInvalidValue (a pose that does not fit, or is not finite)
+  /// Fails: kInvalidLength (numbers of vertices or solids), kInvalidValue (not finite)
   core::Result<SkinFaults> look(const SkinPose& pose) const;
   /// Sums the faults beyond the allowed ones.
   /// In: allowed  faults of the same skin; an entry of `faults` that is no worse than the allowed

@@ -30,15 +30,15 @@ struct JointMotion {
 struct GivenJoint {
   Vector3 position{};
   std::vector<JointMotion> motions;  // [expressions]; empty: no expression moves it
-  /// The joint on the other side; itself if it lies in the middle; kUnknown: found by place and
-  /// motion.
+  /// Index of the joint on the other side of the face; of this joint itself if it lies in the
+  /// middle; kUnknown: the fit finds it by place and motion.
   std::uint32_t mirrored = kUnknown;
   static constexpr std::uint32_t kUnknown = 0xffffffffu;
 };
 
-/// A point about which the vertices of some expressions turn, such as the centre of an eye for its
-/// lids or the hinge of a jaw. A joint that moves mostly in these expressions is placed there,
-/// because its vertices then follow an arc while the expression goes from 0 to 1.
+/// A point about which vertices turn in some expressions, such as the centre of an eye for its lids
+/// or the hinge of a jaw. A joint that moves mostly in these expressions is placed at this point,
+/// so that its vertices follow an arc while the expression goes from 0 to 1.
 struct Pivot {
   Vector3 position{};
   std::vector<std::uint32_t> expressions;
@@ -49,14 +49,15 @@ struct FitOptions {
   std::size_t influences = 8;  // joints of a vertex at most
   double smoothness = 1.0;     // 0: only the error counts; 1: as smooth as Dem Bones' default
   bool symmetric = true;       // mirrored joints and weights, if the mesh is symmetric
-  /// A higher value makes the largest error smaller and the mean error larger; 0: least squares.
+  /// A higher value makes the largest error of a vertex smaller and the mean error larger; 0: the
+  /// sum of squared errors is smallest.
   double emphasis = 3.0;
   /// A joint that is not given takes no part in an expression in which it moves every vertex by
   /// less than this, in the shapes' unit; the other joints take over. 0: all joints take part in
   /// all expressions.
   double least_effect = 0.0;
-  /// The result is the round whose largest error is the smallest. false: only the last four rounds
-  /// are compared; true: the whole second half of the rounds is compared.
+  /// The result is the round whose largest error is the smallest. false: among the last four
+  /// rounds; true: among the second half of all rounds.
   bool bound = false;
   std::size_t rounds = 40;  // of weights and motions, after all joints are placed
   std::size_t threads = 0;  // 0: all cores; the result does not depend on it
@@ -85,8 +86,8 @@ using Progress = std::function<bool(double)>;
 core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
                              const Progress& progress = {});
 
-/// Initial weights: rows as in Fit. They are divided by the sum of their vertex. A vertex whose
-/// weights are all 0 follows the first joint without motion.
+/// Initial weights: rows as in Fit. The weights of a vertex are divided by their sum. A vertex
+/// whose weights are all 0 follows the first joint without motion.
 struct StartWeights {
   std::size_t influences = 0;
   std::vector<std::uint16_t> joints;  // [V][influences]

@@ -37,7 +37,7 @@ class ByHeight {
     });
   }
 
-  /// The vertex nearest to a point, at most `reach` away, or kNone.
+  /// The vertex that is nearest to a point, or Mirror::kNone if none is at most `reach` away.
   std::uint32_t nearest(const Vector3& point, double reach) const {
     const auto from =
         std::lower_bound(order_.begin(), order_.end(), point[1] - reach,
@@ -71,7 +71,9 @@ bool edges_agree(const std::vector<Edge>& edges, const std::vector<std::uint32_t
   });
 }
 
-/// Squared length of expression e, and of its difference to the mirrored expression f.
+/// The squared length of expression e, and the squared length of its difference from the mirrored
+/// expression f. An expression is here a vector of all displacements.
+/// In: other  [V] the vertex on the other side
 std::array<double, 2> difference(const Shapes& shapes, const std::vector<std::uint32_t>& other,
                                  std::size_t e, std::size_t f) {
   double length = 0.0, apart = 0.0;

@@ -17,9 +17,10 @@ struct Mirror {
 };
 
 /// The mirror of a mesh across the plane x = 0; empty if the mesh is not symmetric. Two vertices
-/// are a pair if their distance after mirroring is below 0.0005 of the longest side of the mesh's
-/// bounding box and their edges agree. Two expressions are a pair if one differs from the mirrored
-/// other by at most 5 % of its own length, both as vectors of all displacements.
+/// are a pair if one is, after mirroring, nearer to the other than 0.0005 of the longest side of
+/// the mesh's bounding box, and if mirrored edges are edges, too. Two
+/// expressions are a pair if one differs from the mirrored other by at most 5 % of its own length,
+/// both as vectors of all displacements.
 Mirror find_mirror(const Shapes& shapes);
 
 }  // namespace risorius::author

@@ -94,8 +94,9 @@ void take_filter_off(std::uint8_t* rows, const Packing& packing) {
   }
 }
 
-/// The corners as uint32, the input type of meshoptimizer. In: rows  little-endian corners of
-/// `stride` bytes, 2 or 4
+/// Converts corners to uint32, which meshoptimizer expects.
+/// In: rows    little-endian corners
+///     stride  bytes of a corner, 2 or 4
 std::vector<std::uint32_t> corners_of(std::span<const std::uint8_t> rows, std::size_t stride) {
   std::vector<std::uint32_t> out(rows.size() / stride);
   for (std::size_t i = 0; i < out.size(); ++i) {

@@ -34,9 +34,9 @@ struct Packing {
 core::Result<std::vector<std::uint8_t>> unpack(std::span<const std::uint8_t> packed,
                                                const Packing& packing);
 
-/// Packs rows so that `unpack` and every reader of the extension return them. Only the order of a
-/// triangle's corners may be rotated. If the packing has a filter, the rows must come from
-/// `filtered`.
+/// Packs rows so that `unpack` and every reader of the extension return the same rows, except that
+/// a triangle may begin with another of its corners. If the packing has a filter, the rows must
+/// come from `filtered`.
 /// In: rows  count * stride bytes
 /// Fails: kInvalidArgument as unpack, kInvalidLength (rows), kInvalidValue (a corner of 2^30 or
 ///        more)
@@ -46,8 +46,8 @@ core::Result<std::vector<std::uint8_t>> pack(std::span<const std::uint8_t> rows,
 /// Rows of packing.stride bytes from which `unpack` with the filter restores the values.
 /// In: values  packing.count rows of 4 numbers for unit vectors and quaternions, or of stride / 4
 ///             numbers for floats
-///     bits    of a component: 1 to 16 for vectors (at most 8 if the stride is 4), 4 to 16 for
-///             quaternions, 1 to 24 for floats
+///     bits    precision of a component: 1 to 16 for vectors (at most 8 if the stride is 4), 4 to
+///             16 for quaternions, 1 to 24 for floats
 /// Fails: kInvalidArgument (a packing without filter; a stride or bits that the filter rejects),
 ///        kInvalidLength (values), kInvalidValue (a value that is not finite)
 core::Result<std::vector<std::uint8_t>> filtered(std::span<const float> values,

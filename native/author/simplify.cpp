@@ -69,8 +69,8 @@ Point cross(const Point& a, const Point& b) {
 double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double length(const Point& a) { return std::sqrt(dot(a, a)); }
 
-/// Flips the common edge of two triangles if one is a sliver and both lie in nearly one plane. No
-/// corner moves.
+/// Mends slivers of a mesh: flips the common edge of two triangles if one of them is a sliver and
+/// both lie in nearly one plane. No corner moves.
 class Slivers {
  public:
   Slivers(const Surface& surface, std::vector<Triangle>& triangles)
@@ -112,8 +112,8 @@ class Slivers {
   }
 
   bool turn_some() {
-    // Edges by their corners, so that the triangles on the two sides of a seam do not share an
-    // edge.
+    // The keys of `sides` are pairs of corners, not of positions: two triangles on the two sides of
+    // a seam do not share an edge, so that the seam is never flipped.
     std::map<Edge, std::vector<Side>> sides;
     std::map<Edge, int> edges;
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {

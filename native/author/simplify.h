@@ -29,11 +29,11 @@ struct Simplified {
   double error = 0.0;               // distance from the input divided by the input's size
 };
 
-/// A surface with at most `triangles` triangles if possible. Edges are collapsed where that changes
-/// the surface least; corners are never moved. Seams and borders are preserved, so that the result
-/// may have more triangles. The common edge of two triangles that lie in nearly one plane is
-/// flipped if one of them is a sliver. A surface that already has at most `triangles` triangles is
-/// returned unchanged.
+/// A surface with at most `triangles` triangles if possible. Edges are collapsed at places where
+/// this changes the surface least; corners are never moved. Seams and borders are preserved, so
+/// that the result may have more than `triangles` triangles. The common edge of two triangles
+/// that lie in nearly one plane is flipped if one of them is a sliver. A surface that already has
+/// at most `triangles` triangles is returned unchanged.
 /// Fails: kInvalidLength (attributes), kInvalidIndex (a triangle's corner),
 ///        kInvalidValue (a number that is not finite), kInvalidArgument (more than 32 attributes)
 /// Source: Garland and Heckbert, "Surface Simplification Using Quadric Error Metrics" (1997), as

@@ -20,8 +20,8 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Indices = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 
-/// Makes Shapes from neutral [V, 3], displacements [E, V, 3], edges [n, 2] and importance [V] or
-/// empty. Raises ValueError if the shapes of the first three do not agree.
+/// Makes author::Shapes from NumPy arrays: neutral [V, 3], displacements [E, V, 3], edges [n, 2],
+/// and importance [V] or []. Raises ValueError if one of the first three arrays has another shape.
 author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const Indices& edges,
                       const Doubles& importance) {
   if (neutral.ndim() != 2 || neutral.shape(1) != 3) shape_error("neutral", "(V, 3)", neutral);
@@ -81,13 +81,13 @@ std::vector<author::GivenJoint> given_joints(const Doubles& positions, const Dou
   return out;
 }
 
-/// Existing joints with their motions.
+/// Joints that the rig has already, with their motions; the class GivenJoints of Python.
 struct GivenJoints {
   std::vector<author::GivenJoint> joints;
 };
 
-/// Makes GivenJoints from positions [J, 3], rotations and translations [E, J, 3], and indices [J]
-/// of mirrored joints, or an empty array.
+/// Makes GivenJoints from the arguments of Python: positions [J, 3]; rotations (vectors in radians)
+/// and translations [E, J, 3]; mirrored [J], the index of each joint's mirrored joint, or [].
 GivenJoints given(const Doubles& positions, const Doubles& rotations, const Doubles& translations,
                   const Indices& mirrored) {
   if (positions.ndim() != 2 || positions.shape(1) != 3) {
@@ -117,9 +117,9 @@ author::StartWeights start_weights(const Indices& joints, const Floats& weights)
   return out;
 }
 
-/// The options with the given joints; their number is added to options.joints, which from Python
-/// counts only new joints. Raises ValueError if a given joint's motions have another number of
-/// expressions than the shapes.
+/// The options with the given joints. In Python, options.joints counts only new joints, so the
+/// number of given joints is added. Raises ValueError if the motions of a given joint and the
+/// shapes have different numbers of expressions.
 author::FitOptions with_given(author::FitOptions options, const author::Shapes& shapes,
                               const GivenJoints& given) {
   for (const author::GivenJoint& joint : given.joints) {
@@ -288,8 +288,8 @@ void bind_fits(py::module_& m) {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The enumerator that a name such as "TRIANGLES" stands for. Raises ValueError for a name that is
-/// not in `known`. In: what  name of the argument, for the error
+/// The enumerator whose name in `known` is `name`, such as "TRIANGLES". Raises ValueError if
+/// `known` does not contain the name. In: what  name of the argument, for the error
 template <class T, std::size_t kCount>
 T named(const char* what, const std::string& name,
         const std::array<std::pair<const char*, T>, kCount>& known) {

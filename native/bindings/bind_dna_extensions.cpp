@@ -181,8 +181,8 @@ void bind_rbf(py::module_& m) {
   parts(ext, "poses", [](auto& s) -> auto& { return s.poses; });
 }
 
-// uint16[J, 3]: the representations of translation, rotation and scale, as the numbers that the DNA
-// format defines.
+// uint16[joints, 3]: how the file represents each joint's translation, rotation and scale, as the
+// numbers that the DNA format defines.
 py::array representations(const dna::JointBehaviorMetadata& s) {
   const auto& list = s.joint_representations;
   py::array_t<std::uint16_t> out({static_cast<py::ssize_t>(list.size()), py::ssize_t{3}});

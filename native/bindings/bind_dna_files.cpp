@@ -190,8 +190,9 @@ void bind_layers(DnaClass& c) {
       "Ids of the file's layers in its order.");
 }
 
-// The number that the DNA format gives to a word such as "cm". A word like "#17", by which
-// properties show a number that the format does not define, is rejected.
+// The number that the DNA format gives to a word such as "cm"; nullopt without a text. Raises
+// ValueError for other words, also for words such as "#17", by which properties show a number that
+// the format does not define.
 template <class Number, std::size_t kCount>
 std::optional<Number> choice_argument(const std::array<const char*, kCount>& words,
                                       const std::optional<std::string>& text, const char* name) {

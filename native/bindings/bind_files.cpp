@@ -9,7 +9,8 @@ namespace risorius::bindings {
 namespace {
 
 [[noreturn]] void throw_os_error(const std::filesystem::path& path, const std::error_code& reason) {
-  // Python's OSError chooses a subclass such as PermissionError by the error number.
+  // The error number is the first argument, because Python's OSError chooses its subclass, such as
+  // PermissionError, by this number.
   const py::tuple about =
       py::make_tuple(reason.default_error_condition().value(),
                      to_python(bytes::write_trouble(reason)), py::str(py::cast(path)));
@@ -17,8 +18,8 @@ namespace {
   throw py::error_already_set();
 }
 
-// A new hidden file in the folder of `path`, into which Python writes. commit() flushes it to disk
-// and replaces `path` with it; discard() removes it.
+// A new hidden file in the folder of `path`, into which Python writes. commit() flushes the hidden
+// file to disk and replaces the file at `path` with it; discard() removes the hidden file.
 class FileReplacement {
  public:
   FileReplacement(const std::filesystem::path& path, bool sweep) : path_(path) {

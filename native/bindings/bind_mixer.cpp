@@ -10,7 +10,8 @@ namespace {
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using IndexArray = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 using CurvesPtr = std::shared_ptr<const clip::LayerCurves>;
-// Wraps the curves, because pybind11 cannot hold a pointer to a const object.
+// The class LayerCurves of Python. It contains the pointer to the curves, because pybind11 cannot
+// hold a pointer to a const object.
 struct PyLayerCurves {
   CurvesPtr curves;
 };
@@ -19,8 +20,8 @@ using PartTuple = std::tuple<IndexArray, FloatArray, double, double, double, dou
 // Arguments of the mixer's rule Yield: by, of, measure, amount.
 using YieldTuple = std::tuple<IndexArray, IndexArray, std::string, float>;
 
-// Returns the value of a result, or raises its error as a ValueError: no file is involved that a
-// more specific error could name.
+// Returns the value of a result, or raises its error as a ValueError. The errors of the mixer
+// concern no file, so that no other class of error fits.
 template <class T>
 T value_or_throw(core::Result<T>&& result) {
   if (!result) throw py::value_error(result.error().describe());

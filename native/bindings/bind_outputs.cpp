@@ -30,7 +30,8 @@ FloatArray matrix_argument(const py::object& object, const char* name, py::ssize
   return array;
 }
 
-// Checks the caller's array, or makes a new one. Raises ValueError if the array overlaps `base`.
+// Checks the argument `out`, the caller's array for the result, or makes a new array if it is None.
+// Raises ValueError if the array overlaps `base`, or is no writeable float32[rows, 3].
 py::array_t<float> output_argument(const py::object& object, py::ssize_t rows, const float* base) {
   if (object.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
   const py::array_t<float> out = written_argument(object, "out", rows);

@@ -86,7 +86,8 @@ std::shared_ptr<rig::Rig> make_rig(const dna::Dna& dna, const std::string& preci
   return std::make_shared<rig::Rig>(unwrap(compile::compile(dna, options)));
 }
 
-// Keeps a Python buffer alive. Its last owner may release it without the interpreter lock.
+// An owner for open_rig that keeps a Python buffer alive. The last copy of the owner may be
+// released by a thread that does not hold the interpreter lock.
 std::shared_ptr<const void> keep(const py::buffer& buffer, const void* address) {
   auto* held = new py::buffer_info(buffer.request());
   return {address, [held](const void*) {
@@ -95,9 +96,9 @@ std::shared_ptr<const void> keep(const py::buffer& buffer, const void* address) 
           }};
 }
 
-// A bytes object is immutable and can be used in place. Any other buffer is copied, even a
-// read-only view, because its owner may still write to it. Bytes whose address is not a multiple of
-// 64 are copied too.
+// Opens a rig from its bytes. A bytes object is immutable, so it is used in place, unless its
+// address is not a multiple of 64. Any other buffer is copied, even a read-only view, because the
+// view's owner may still write to it.
 std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
                                          const std::optional<std::string>& simd) {
   const py::buffer_info info = buffer.request();
@@ -150,8 +151,8 @@ std::shared_ptr<rig::Rig> load_rig(const std::filesystem::path& path, std::optio
   return std::make_shared<rig::Rig>(unwrap(open()));
 }
 
-// Converts raw controls of one or several frames: float32[R] or float32[N, R]. Raises ValueError
-// for another shape.
+// Converts the raw controls of one frame, float32[R], or of several frames, float32[N, R]. Raises
+// ValueError for another shape.
 FloatArray frames_argument(const rig::Rig& rig, const py::object& raw) {
   FloatArray in = FloatArray::ensure(raw);
   if (!in) throw py::value_error("raw: an array of numbers was expected");
@@ -163,7 +164,7 @@ FloatArray frames_argument(const rig::Rig& rig, const py::object& raw) {
   return in;
 }
 
-// Returns [(frame, name, value)] of the raw controls that are not finite.
+// Returns (frame, name of the control, value) for each raw control that is not finite.
 py::list find_non_finite(const rig::Rig& rig, const py::object& raw) {
   const FloatArray in = frames_argument(rig, raw);
   const auto frames = static_cast<std::size_t>(in.ndim() == 1 ? 1 : in.shape(0));
@@ -175,8 +176,8 @@ py::list find_non_finite(const rig::Rig& rig, const py::object& raw) {
   return out;
 }
 
-// Returns (float64[poses], float32[poses]): the distances of the controls from a solver's poses,
-// and the poses' weights.
+// Returns the distances of the controls from the poses of the solver `index`, float64[poses], and
+// the weights of these poses, float32[poses].
 py::tuple solver_poses(const rig::Rig& rig, std::uint32_t index, const py::object& controls) {
   if (index >= rig.rbf_solvers.size()) {
     throw py::index_error("index: a solver below " + std::to_string(rig.rbf_solvers.size()) +

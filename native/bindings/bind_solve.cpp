@@ -34,7 +34,8 @@ py::array_t<double> made(std::size_t rows, std::size_t columns) {
   return py::array_t<double>({static_cast<py::ssize_t>(rows), static_cast<py::ssize_t>(columns)});
 }
 
-/// Some points of a surface, and the Jacobian of the most recent linearise().
+/// Points of a surface, and the Jacobian of their positions that the last linearise() computed. A
+/// lock lets only one thread use it at a time.
 class PyProbe {
  public:
   PyProbe(SurfacePtr surface, const Indices& points)

@@ -38,7 +38,8 @@ py::class_<T, std::shared_ptr<T>> value_class(py::module_& m, const char* name, 
 // In: name  of the property
 //     get   function from an object to a reference to its field
 
-/// A property of numbers: a NumPy array; float32[n, 3] or [n, 2] for coordinates.
+/// A property that is a list of numbers, as a NumPy array; float32[n, 3] or float32[n, 2] if the
+/// field is a list of coordinates.
 template <class Class, class Get>
 void numbers(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -106,7 +107,8 @@ void part(Class& c, const char* name, Get get) {
       [get](Owner& self, const Field& value) { get(self) = value; });
 }
 
-/// A property that is a list of structs, shown as a tuple. Its elements can be changed.
+/// A property that is a list of structs, shown as a tuple. A change of an element of the tuple
+/// changes the struct in the list.
 template <class Class, class Get>
 void parts(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -135,14 +137,15 @@ inline constexpr std::array<const char*, 6> kDirections{"left", "right", "up",
 inline constexpr std::array<const char*, 6> kSequences{"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
 inline constexpr std::array<const char*, 2> kWindings{"ccw", "cw"};
 
-/// The word for a number of an enumeration; "#17" for a number that the format does not define.
+/// The word for a number of an enumeration; for a number that the format does not define, the
+/// number after "#", for example "#17".
 template <std::size_t kCount>
 std::string word(const std::array<const char*, kCount>& words, std::uint32_t value) {
   return value < kCount ? words[value] : "#" + std::to_string(value);
 }
 
-/// The number for a word; 17 for "#17". In: name  of the field. Raises ValueError for an unknown
-/// word.
+/// The number that `word` turns into the text, for example 17 for "#17". Raises ValueError for an
+/// unknown word. In: name  of the field, for the error
 template <class Number, std::size_t kCount>
 Number value_of_word(const std::array<const char*, kCount>& words, const std::string& text,
                      const char* name) {
@@ -167,7 +170,8 @@ void choice(Class& c, const char* name, const std::array<const char*, kCount>& w
       });
 }
 
-/// Converts a LodMapping, or a list that has a list of indices for each LOD.
+/// Converts a Python value to a LodMapping: a LodMapping itself, or a list that contains for each
+/// LOD a list of indices.
 inline dna::LodMapping lod_mapping_from_python(const py::object& value) {
   if (py::isinstance<dna::LodMapping>(value)) return value.cast<dna::LodMapping>();
   dna::LodMapping mapping;
@@ -181,7 +185,8 @@ inline dna::LodMapping lod_mapping_from_python(const py::object& value) {
   return mapping;
 }
 
-/// A property that is a LodMapping. It also accepts a list that has a list of indices for each LOD.
+/// A property that is a LodMapping. A list that contains for each LOD a list of indices can be
+/// assigned to it as well.
 template <class Class, class Get>
 void lod_mapping(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;

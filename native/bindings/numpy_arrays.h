@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Converts core arrays to NumPy views and back. A view keeps the buffer alive, not the Dna.
+// Converts core arrays to NumPy views and back. A view keeps only the buffer of its array alive,
+// not the Dna that contains the array.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -22,8 +23,8 @@ namespace py = pybind11;
 /// In: file  the file that the error is about, or ""
 ///     type  the exception class; nullptr: risorius.DnaError
 void throw_error(const core::Error& error, const std::string& file = "", PyObject* type = nullptr);
-/// Makes an error class derived from risorius.base.errors.RisoriusError. The caller must never
-/// release it.
+/// Makes a Python error class derived from risorius.base.errors.RisoriusError. The caller must keep
+/// the class until the process ends.
 PyObject* new_error_type(const char* name, const char* doc);
 
 /// Returns the value of a result, or raises its error as a risorius.DnaError. In: file  the file
@@ -58,7 +59,8 @@ py::array read_only_view(const core::Array<T>& values, std::vector<py::ssize_t> 
   return view;
 }
 
-/// Read-only views without a copy: T[n] of an array, and float32[n, planes] of planes.
+/// Read-only NumPy views without a copy: T[n] of a core::Array, and float32[n, planes] of a
+/// core::PlanarArray.
 template <class T>
 py::array to_numpy(const core::Array<T>& values) {
   return read_only_view(values, {static_cast<py::ssize_t>(values.size())},
@@ -73,8 +75,10 @@ py::array to_numpy(const core::PlanarArray<kPlanes>& array) {
       {static_cast<py::ssize_t>(sizeof(float)), n * static_cast<py::ssize_t>(sizeof(float))});
 }
 
-/// Raises ValueError for an array of another shape. In: wanted  the expected shape in words, e.g.
-/// "(n, 3)"
+/// Raises the ValueError that an array has the wrong shape.
+/// In: name    of the argument
+///     wanted  the expected shape as a text, e.g. "(n, 3)"
+///     given   the array
 [[noreturn]] inline void shape_error(const std::string& name, const std::string& wanted,
                                      const py::array& given) {
   throw py::value_error(name + ": an array of shape " + wanted + " was expected, the shape is " +
@@ -108,8 +112,8 @@ inline FloatArray shaped_argument(const py::object& object, const char* name,
   return array;
 }
 
-/// An output array of the caller: raises ValueError unless it is a writeable C-contiguous float32
-/// array of shape (rows, 3).
+/// The array into which a function writes for its caller. Raises ValueError unless it is a
+/// writeable C-contiguous float32 array of shape (rows, 3).
 inline py::array_t<float> written_argument(const py::object& object, const char* name,
                                            py::ssize_t rows) {
   if (!py::isinstance<py::array_t<float, py::array::c_style>>(object)) {
@@ -150,8 +154,8 @@ core::Array<T> from_python(const py::object& object, const char* name) {
   return core::Array<T>(std::vector<T>(typed.data(), typed.data() + typed.size()));
 }
 
-/// Copies float[n, kPlanes] to planes: all x, then all y, and so on. An array of any shape without
-/// numbers gives no vectors. Raises ValueError for other objects or shapes.
+/// Copies an array float[n, kPlanes] to planes: all x, then all y, and so on. An array without
+/// numbers, of whatever shape, gives 0 vectors. Raises ValueError for other objects or shapes.
 template <std::size_t kPlanes>
 core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const char* name) {
   auto typed = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(object);
@@ -168,8 +172,8 @@ core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const ch
   return {core::Array<float>(std::move(values))};
 }
 
-/// A text of a file as a str. Bytes that are not UTF-8 become surrogates, which text_from_python
-/// converts back to the same bytes.
+/// Converts a text of a file to a str. Bytes that are not UTF-8 become surrogate characters, which
+/// text_from_python converts back to the same bytes.
 inline py::str to_python(const std::string& text) {
   PyObject* decoded =
       PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "surrogateescape");

@@ -8,9 +8,10 @@
 
 namespace risorius::bindings {
 
-/// Calls the Python function `told`, which may be None, with the share of the work that is done, 0
-/// to 1, under the GIL. The work stops if the function returns False. An exception, also Ctrl-C,
-/// stops the work too and is kept in `raised`, so that the caller can throw it again.
+/// Calls the Python function `told`, under the GIL, with the share of the work that is done, 0 to
+/// 1. If `told` is None, nothing is called. The work stops if the function returns False. An
+/// exception, also Ctrl-C, stops the work too and is kept in `raised`, so that the caller can throw
+/// it again.
 struct Teller {
   pybind11::object told;
   std::exception_ptr raised;

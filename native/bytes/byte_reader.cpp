@@ -49,7 +49,8 @@ void ByteReader::clear_error() {
 }
 
 // Sets ready_, the end of the bytes that can be read without a further check or refill. After a
-// failure there are no such bytes, so that fast paths need not test for a failure.
+// failure it is the position itself, so that code which compares with ready_ need not test for a
+// failure.
 void ByteReader::bound() {
   const auto loaded = static_cast<std::uint64_t>(loaded_ - at_);
   ready_ = failed() ? at_ : at_ + std::min(loaded, left());
@@ -91,11 +92,11 @@ bool ByteReader::check_left(std::uint64_t bytes) {
 
 bool ByteReader::need(std::size_t n) { return check_left(n) && refill(n, n); }
 
-// Reads the file into the window, so that the window begins at the position and has at least n
-// bytes, and more of the `wanted` bytes that will be read soon, if it has room.
-// In:  n       a few bytes
-//      wanted  number of bytes, n to left()
-// Out: false, with an error, if the file ends before
+// Reads the file into the window. The window then begins at the position and has at least n bytes,
+// and as many of the `wanted` bytes as have room in it.
+// In:  n       number of bytes that are needed now, a few
+//      wanted  number of bytes that will be read soon, from n to left()
+// Out: false, with an error, if the file ends before the n bytes do
 bool ByteReader::refill(std::size_t n, std::uint64_t wanted) {
   if (window_.size() == 0) window_.resize(kWindowBytes);
   const auto rest = static_cast<std::size_t>(loaded_ - at_);  // a few bytes of an incomplete number

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A checked big-endian reader over a Source. Every error of a parser that reads bytes is made here
-// or passes through fail_at() here, so that it has an offset and a field.
+// A big-endian reader over a Source, which checks each read. A parser that reads bytes gets all its
+// errors from this reader or reports them by fail_at(), so that each error has an offset and a
+// field.
 #pragma once
 
 #include <bit>
@@ -43,9 +44,10 @@ class ByteReader {
   bool failed() const { return error_.has_value(); }
   const core::Error& error() const { return *error_; }
   core::Unexpected take_error() { return core::Unexpected{*error_}; }
-  /// Clears the error, so that enter() can continue elsewhere.
+  /// Clears the error, so that reading can go on after a call of enter() with another region.
   void clear_error();
-  /// Sets the largest count that count() accepts for a list or a text, even if more bytes are left.
+  /// Sets the largest number of elements that count() accepts for a list or a text. count() fails
+  /// for a larger number even if the source has enough bytes for it.
   void set_max_count(std::uint32_t n) { max_count_ = n; }
   /// Remembers an error, unless there is one already. The error's field is where().
   /// In: offset  offset of the wrong byte in the source
@@ -92,12 +94,12 @@ class ByteReader {
   /// Reads a count, then that number of values.
   /// Out: largest      raised to the largest value
   core::Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
-  /// Reads n values without a count, straight into out, and sets all_finite as f32_list does. After
-  /// a failure the content of out is undefined.
-  /// In: n  checked with count() before, so that out has room for n values
+  /// Reads n values into out; no count precedes them. Sets all_finite as f32_list does. After a
+  /// failure the content of out is undefined.
+  /// In: n  number of values for which out has room; checked by count() before
   void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
-  /// Read n integers without a count, as read_f32 does. `largest` of read_u32 is raised as in
-  /// u32_list.
+  /// Read n integers into out, as read_f32 does. read_u32 raises `largest` to the largest value, as
+  /// u32_list does.
   void read_u16(std::uint16_t* out, std::size_t n);
   void read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest = nullptr);
 

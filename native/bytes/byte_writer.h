@@ -51,8 +51,8 @@ class ByteWriter {
       }
     }
   }
-  /// Overwrites the four bytes from position `at` on with v, for sizes and offsets that are known
-  /// only later.
+  /// Overwrites the four bytes from position `at` on with v: a size or an offset that was not known
+  /// when these bytes were first written.
   void patch_u32(std::size_t at, std::uint32_t v) {
     for (std::size_t i = 0; i < 4; ++i)
       bytes_[at + i] = static_cast<std::uint8_t>(v >> (24 - 8 * i));

@@ -14,8 +14,9 @@ namespace risorius::bytes {
 struct FileBytes {
   std::span<const std::uint8_t> bytes;  // begin on a multiple of 64 bytes
   std::shared_ptr<const void> owner;    // keeps the bytes alive
-  /// The user of this process owns the file, and its access mode lets nobody else write to it.
-  /// Checked on the open file, not on its name. Always false on Windows, which has no such modes.
+  /// Whether the user of this process owns the file and the file's access mode lets nobody else
+  /// write to it. This is checked on the open file, not on its name. Always false on Windows, which
+  /// has no such modes.
   bool is_own = false;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A file as a source of bytes: the file stays open, and each read states its offset. A Handle is a
-// file descriptor, on Windows a C stream.
+// A file as a source of bytes: the file stays open, and each read gives the offset of its bytes. A
+// Handle is a file descriptor, on Windows a C stream.
 #include <cerrno>
 #include <cstdio>
 #include <system_error>

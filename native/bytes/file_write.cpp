@@ -89,8 +89,9 @@ std::string machine_name() {
   return GetComputerNameA(name, &length) ? std::string(name, length) : std::string();
 }
 
-// Does nothing on Windows, where a file only has a read-only flag. A read-only file cannot be
-// replaced, and a read-only new file could not be removed.
+// Gives a new file the access rights of the file that it replaces. Does nothing on Windows, where
+// a read-only flag is the only right of a file: a read-only file cannot be replaced anyway, and a
+// read-only new file could not be removed.
 void inherit_rights(const fs::path&, const fs::path&) {}
 
 #else
@@ -118,13 +119,15 @@ int sync_folder(const fs::path& folder) {
 
 long long process_number() { return ::getpid(); }
 
-// Whether a process has ended although its number is still in use. In some containers nobody
-// collects ended orphans: they keep their number as zombies as long as the container runs.
+// Whether a process has ended although its number is still in use. In some containers no process
+// waits for orphaned processes: an ended orphan keeps its number as a zombie until the container
+// ends.
 bool has_ended(long long process) {
   std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
   std::string text;
   std::getline(stat, text, '\0');
-  // The state of the process follows the program's name, which may contain any character.
+  // The letter for the state of the process follows the program's name in parentheses. The name may
+  // contain any character, so the last parenthesis is searched for.
   const std::size_t end = text.rfind(") ");
   return end != std::string::npos && end + 2 < text.size() &&
          (text[end + 2] == 'Z' || text[end + 2] == 'X');
@@ -135,8 +138,8 @@ bool is_running(long long process) {
   return !has_ended(process);
 }
 
-// The name of the machine and of its process namespace, because containers of one machine number
-// their processes independently.
+// The name of the machine, followed by its process namespace, because each container of a machine
+// has process numbers of its own.
 std::string machine_name() {
   char name[256] = {};
   if (::gethostname(name, sizeof(name) - 1) != 0) return {};
@@ -146,8 +149,9 @@ std::string machine_name() {
          (length > 0 ? std::string(space, static_cast<std::size_t>(length)) : "");
 }
 
-// Gives a new file the group of the old one. If that is not allowed, the new file stays in another
-// group, and this group gets only the rights that everybody has.
+// Gives a new file the group of the file that it replaces. If that is not allowed, the new file
+// stays in another group, and the group in `rights` gets only the rights that everybody has.
+// In/out: rights  rights that the new file will get
 void keep_group(const fs::path& old, const fs::path& made, fs::perms& rights) {
   struct stat before = {}, now = {};
   if (::stat(old.c_str(), &before) != 0 || ::stat(made.c_str(), &now) != 0) return;
@@ -180,7 +184,8 @@ std::error_code last_error() { return {errno == 0 ? EIO : errno, std::generic_ca
 
 // ---- names
 
-// The beginning of a hidden name, ".risorius-MACHINE-"; PROCESS-TOKEN.part follows it.
+// The beginning of a hidden name: ".risorius-MACHINE-" of the name
+// ".risorius-MACHINE-PROCESS-TOKEN.part".
 std::string name_begin() {
   std::string machine = machine_name().substr(0, kMachineLength);
   std::replace_if(
@@ -198,8 +203,8 @@ std::string hidden_name() {
   return name_begin() + std::to_string(process_number()) + "-" + token + std::string(kEnd);
 }
 
-// The number of the process that made a file with this hidden name. Nullopt for other names and for
-// names of other machines. In: begin  result of name_begin()
+// The number of the process that made the file with the hidden name `name`. Nullopt if `name` is no
+// such name, or is one of another machine. In: begin  result of name_begin()
 std::optional<long long> maker_of(std::string_view name, std::string_view begin) {
   constexpr std::size_t kTail = 1 + kTokenDigits + kEnd.size();
   if (!name.starts_with(begin) || !name.ends_with(kEnd)) return {};
@@ -236,7 +241,8 @@ fs::path linked_file(const fs::path& path) {
   fs::path file = path;
   std::error_code error;
   for (int i = 0; i < kMostLinks && fs::is_symlink(file, error); ++i) {
-    // The link is followed by hand, because its target need not exist.
+    // The links are read one by one, because functions that resolve a whole path fail if its target
+    // does not exist.
     const fs::path next = fs::read_symlink(file, error);
     if (error) return path;
     file = file.parent_path() / next;
@@ -333,7 +339,7 @@ std::optional<NewFile> NewFile::adopt(const fs::path& path, std::error_code& err
 }
 
 std::error_code NewFile::write(std::span<const std::uint8_t> bytes) {
-  // MacOS and Windows refuse 2 GiB and more in one call.
+  // macOS and Windows refuse to write 2 GiB or more in one call.
   constexpr std::size_t kMost = std::size_t{1} << 30;
   while (!bytes.empty()) {
     errno = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Writes a file so that the old one is complete until the new one is.
+// Writes a file so that the old file stays complete until the new file is complete and replaces it.
 #pragma once
 
 #include <cstddef>
@@ -36,22 +36,23 @@ class NewFile {
   /// Whether the destructor removes or keeps a file that never got its final name.
   enum class Leftover { kRemove, kKeep };
 
-  /// Makes an empty file. Out: nullopt if it fails, with the system's reason in `error`:
-  /// std::errc::file_exists if the name is taken.
+  /// Makes an empty file. Out: nullopt if it fails, with the system's reason in `error`, which is
+  /// std::errc::file_exists if a file with this name exists.
   static std::optional<NewFile> create(const std::filesystem::path& path, Leftover leftover,
                                        std::error_code& error,
                                        const FileCalls& calls = system_file_calls());
   /// Makes a file in the folder of `target` under a hidden name, whose length does not depend on
   /// the name of `target`. If `target` exists, only the owner can read the new file until
-  /// take_place_of gives it the rights of `target` (not on Windows). The destructor removes a file
-  /// that never took the place of another. Out: nullopt if it fails, with the reason in `error`:
-  /// the system's; is_a_directory if `target` is a folder; not_a_directory if its folder is a file.
+  /// take_place_of gives it the rights of `target` (not on Windows). The destructor removes the
+  /// file if take_place_of has not renamed it. Out: nullopt if it fails, with the reason in
+  /// `error`: is_a_directory if `target` is a folder, not_a_directory if its folder is a file,
+  /// otherwise the system's reason.
   static std::optional<NewFile> beside(const std::filesystem::path& target, std::error_code& error,
                                        const FileCalls& calls = system_file_calls());
 
-  /// Opens a complete file that another writer has made on the file system of its final place. It
-  /// keeps its name until take_place_of, and the destructor does not remove it. Out: nullopt if it
-  /// fails, with the system's reason in `error`.
+  /// Opens a complete file that another program has written, on the file system of its final place.
+  /// The file keeps its name until take_place_of, and the destructor does not remove it. Out:
+  /// nullopt if it fails, with the system's reason in `error`.
   static std::optional<NewFile> adopt(const std::filesystem::path& path, std::error_code& error,
                                       const FileCalls& calls = system_file_calls());
 
@@ -90,8 +91,8 @@ std::filesystem::path linked_file(const std::filesystem::path& path);
 
 /// Makes a hidden folder in the folder of `target`, named like the files of NewFile::beside, for
 /// several files that are not in their final places yet. Out: the folder's path; empty if the call
-/// fails, with the reason in `error`: the system's; is_a_directory if `target` is a folder;
-/// not_a_directory if its folder is a file.
+/// fails, with the reason in `error`: is_a_directory if `target` is a folder, not_a_directory if
+/// its folder is a file, otherwise the system's reason.
 std::filesystem::path make_hidden_folder(const std::filesystem::path& target,
                                          std::error_code& error);
 
@@ -100,7 +101,8 @@ std::filesystem::path make_hidden_folder(const std::filesystem::path& target,
 /// are skipped without an error.
 void remove_leftovers(const std::filesystem::path& folder);
 
-/// The reason why a file could not be written, in the system's words or in clearer ones.
+/// The reason why a file could not be written, as a text: for some reasons a clearer text than the
+/// system's, otherwise the system's.
 std::string write_trouble(const std::error_code& reason);
 
 /// Writes bytes to a new file beside path, flushes it to disk and replaces path with it; a link

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Source of bytes: a span in memory, or a file that is read in pieces.
+// A source of bytes for readers: bytes in memory, or a file that is read piece by piece.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ class Source {
  public:
   virtual ~Source() = default;
   virtual std::uint64_t size() const = 0;
-  /// Reads up to out.size() bytes at offset. Out: the number of bytes read; it is smaller at the
-  /// end of the source and if the file cannot be read.
+  /// Reads up to out.size() bytes from offset on. Out: the number of bytes read; it is less than
+  /// out.size() at the end of the source, or if the file cannot be read.
   virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) = 0;
   /// All bytes, if they are in memory for the lifetime of the source; otherwise empty.
   virtual std::span<const std::uint8_t> view() const { return {}; }

@@ -11,7 +11,8 @@
 
 namespace risorius::clip {
 
-/// An event at a time of a clip: a word, a note, a reaction to fire.
+/// An event at a time of a clip, for example a spoken word, a note of the user, or a reaction that
+/// is fired.
 struct Event {
   double time = 0.0;  // seconds, on the clip's own clock
   std::string name;

@@ -78,8 +78,8 @@ void KeptMatrices::write(std::span<float> to) const {
 
 namespace {
 
-// Adds the number of a group's rows at each LOD. Out: the largest number; further rows are not
-// stored, because no LOD evaluates them
+// Appends the number of a group's rows at each LOD to out.joint_group_lods. Out: the largest of
+// these numbers; further rows are not stored, because no LOD evaluates them
 core::Result<std::uint32_t> add_lods(const dna::JointGroup& g, const std::string& where,
                                      RigData& out) {
   if (!g.output_indices.empty()) {
@@ -281,8 +281,8 @@ Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatr
 
 namespace {
 
-// The row that gives each joint attribute its value at a LOD. If several groups write an attribute,
-// the last one in the file wins.
+// [joint attributes] the row that gives the attribute its value at a LOD, or kNone. If several
+// groups write an attribute, the last of them in the file counts.
 std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
                                              std::span<const std::uint32_t> file_order,
                                              std::uint32_t lod) {
@@ -315,7 +315,8 @@ void add_pieces(std::span<const std::uint32_t> rows, std::size_t block, RigData&
   }
 }
 
-// Finds the first and last block of attributes that each group's rows write.
+// Sets blocks_begin and blocks_end of each group: the blocks of attributes from the first to the
+// last that rows of the group write.
 void find_blocks(RigData& out) {
   for (rig::JointGroup& g : out.joint_groups) {
     const auto rows = std::span(out.joint_outputs).subspan(g.rows_begin, g.row_count);

@@ -27,8 +27,8 @@ using detail::StepLods;
 using rig::MlOperation;
 using rig::RigData;
 
-// The graph of operations for a file without layer mlbe: each network gathers its inputs and
-// scatters its outputs.
+// The graph of operations for a file without layer mlbe: for each network a gather that reads its
+// inputs, the network itself, and a scatter that writes its outputs.
 dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   dna::MlType type;
   type.lod_operation_mappings.assign(3, ml.lod_neural_network_mapping);
@@ -54,8 +54,8 @@ dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   return type;
 }
 
-// The mask of each network: the number of the first mesh region that lists it. Also counts the
-// regions in out.mask_count.
+// Network -> its mask, the number of the first mesh region that lists the network. Regions are
+// counted over all meshes. Also adds the number of regions to out.mask_count.
 std::map<std::uint16_t, std::uint32_t> masks_of_networks(const dna::Dna& dna, RigData& out) {
   std::map<std::uint16_t, std::uint32_t> masks;
   for (const auto& mesh : dna.machine_learned_behavior.region_network_indices) {
@@ -138,8 +138,8 @@ class GraphCompiler {
     return ok();
   }
 
-  // Adds the values that an operation reads from other operations. A network that depends on a
-  // gather reads only from gathers.
+  // Adds a segment for each operation from which an operation reads values. A network that depends
+  // on a gather reads only from gathers, not from its other dependencies.
   Status add_segments(const dna::MlOperation& source, MlOperation& op, const std::string& where) {
     std::vector<const MlOperation*> others;
     bool gathers = false;
@@ -210,7 +210,8 @@ class GraphCompiler {
     return ok();
   }
 
-  // Adds a layer. Operations that share a network share its weights.
+  // Adds a layer of a network for one operation. If another operation uses the same network, its
+  // weights are not stored again.
   Status add_layer(const dna::NeuralNetworkLayer& source, std::uint16_t network, std::size_t index,
                    const std::string& where) {
     rig::MlLayer layer;
@@ -248,8 +249,8 @@ class GraphCompiler {
     }
   }
 
-  // Lists the operations of each LOD. An operation that a LOD lists runs there only if all
-  // operations that it reads from run there too.
+  // Adds the operations of a type to the lists of each LOD. An operation that a LOD lists is left
+  // out if an operation from which it reads does not run at this LOD.
   Status list_lods(const dna::MlType& type, const std::string& where) {
     for (std::uint32_t lod = 0; lod < out_.lod_count; ++lod) {
       std::vector<bool> runs_here(out_.ml_operations.size() - first_, false);  // of this type
@@ -283,13 +284,14 @@ class GraphCompiler {
   std::map<std::uint16_t, std::uint32_t> masks_;
   std::vector<bool> rests_at_one_;
   std::map<std::pair<std::uint16_t, std::size_t>, std::uint32_t> weights_;
-  // The first layer of each network whose layers compute all rows at every LOD.
+  // Network -> index of its first layer in ml_layers; only for networks whose layers compute all
+  // rows at every LOD.
   std::map<std::uint16_t, std::uint32_t> layers_;
   std::vector<std::vector<std::uint32_t>> numbers_;
   std::uint32_t first_ = 0;  // index of the first operation of the type that add_type compiles
 };
 
-// Three rows, the directions of the axes x, y, z as (right, up, front).
+// Three rows, for the axes x, y and z: the direction of the axis as a vector (right, up, front).
 // In: axes  0 left, 1 right, 2 up, 3 down, 4 front, 5 back
 std::array<std::array<float, 3>, 3> basis_of(const std::array<std::uint16_t, 3>& axes) {
   std::array<std::array<float, 3>, 3> rows{};
@@ -300,8 +302,8 @@ std::array<std::array<float, 3>, 3> basis_of(const std::array<std::uint16_t, 3>&
   return rows;
 }
 
-// Sets the axes and the Euler convention of the joint values that networks compute. They are the
-// face's unless the file gives all of them.
+// Sets the axes and the Euler convention to which the joint values of networks refer. They are the
+// axes and the convention of the face, unless parameters 3 to 9 of MlJoints are all present.
 void add_system(const dna::Dna& dna, RigData& out) {
   const dna::MlJoints& joints = dna.machine_learned_behavior_ext.joints;
   std::map<std::uint16_t, std::uint16_t> settings;

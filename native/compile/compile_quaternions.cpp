@@ -18,7 +18,8 @@ namespace {
 
 using rig::RigData;
 
-// [columns]: the first row in which the column rotates a quaternion joint; kNone: it rotates none.
+// [columns]: the first row in which the column rotates a quaternion joint; kNone: the column
+// rotates no quaternion joint.
 std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
                                               const std::vector<bool>& quaternion_joints) {
   const std::size_t columns = g.input_indices.size();
@@ -34,7 +35,8 @@ std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
   return first;
 }
 
-// The rows of a group that write a joint's rotations about x, y and z; kNone: no row.
+// The rows of a joint group that write a joint's rotation about x, about y and about z; kNone: the
+// group has no such row.
 using RotationRows = std::array<std::uint32_t, 3>;
 
 std::map<std::uint32_t, RotationRows> rotation_rows(const dna::JointGroup& g, std::uint32_t rows) {
@@ -48,8 +50,10 @@ std::map<std::uint32_t, RotationRows> rotation_rows(const dna::JointGroup& g, st
   return out;
 }
 
-// Adds one column of a group, with a term for each joint that it rotates. The angle of a missing
-// row is 0.
+// Adds column c of a group, with a term for each quaternion joint that it rotates. If a joint has
+// no row for an axis, the angle about this axis is 0.
+// In: rows        [quaternion joints of the group] their rotation rows
+//     first_slot  index of the first of these joints in out.quaternion_joints
 void add_column(const dna::JointGroup& g, std::size_t c, const std::vector<RotationRows>& rows,
                 std::uint32_t first_slot, RigData& out) {
   const std::size_t columns = g.input_indices.size();
@@ -70,15 +74,15 @@ void add_column(const dna::JointGroup& g, std::size_t c, const std::vector<Rotat
   if (column.terms_end > column.terms_begin) out.quaternion_columns.push_back(column);
 }
 
-// The number of LODs up to the last one that has the row.
+// 1 + the coarsest LOD at which a group evaluates a row; 0 if no LOD evaluates it.
 std::uint32_t levels_of(std::uint32_t row, const RigData& out, std::uint32_t group) {
   std::uint32_t levels = out.lod_count;
   while (levels > 0 && out.joint_group_lods[group * out.lod_count + levels - 1] <= row) --levels;
   return levels;
 }
 
-// Raises the number of LODs at which Euler angles rotate each joint. A row counts even if a later
-// row for the same angle overrides it at finer LODs.
+// Raises euler[joint], the number of LODs at which Euler angles rotate the joint, by the rows of a
+// group. A row counts even if a later row for the same angle replaces it at finer LODs.
 void count_euler_levels(const dna::JointGroup& g, std::uint32_t index,
                         const std::vector<bool>& flags, const RigData& out,
                         std::vector<std::uint32_t>& euler) {
@@ -89,7 +93,8 @@ void count_euler_levels(const dna::JointGroup& g, std::uint32_t index,
   }
 }
 
-// Lists the joints that Euler angles rotate, sorted so that each LOD uses the first ones.
+// Lists the joints that Euler angles rotate. They are sorted so that each LOD uses a number of them
+// from the beginning of the list.
 // In: levels  [joints] number of LODs at which Euler angles rotate the joint; 0: none
 void list_euler_joints(const std::vector<std::uint32_t>& levels, RigData& out) {
   for (std::uint32_t j = 0; j < out.joint_count && out.joint_stride == 10; ++j) {
@@ -137,7 +142,7 @@ std::vector<std::uint32_t> quaternion_column_order(const dna::JointGroup& g,
   for (std::uint32_t c = 0; c < first.size(); ++c) {
     if (first[c] != rig::kNone) order.push_back(c);
   }
-  // The first `live` columns of the order have values at every LOD so far.
+  // The first `live` columns of the order rotate a quaternion joint at every LOD so far.
   std::size_t live = order.size();
   // The smallest row count so far. A LOD with at least as many rows leaves the order unchanged.
   std::uint32_t rows = UINT32_MAX;
@@ -168,7 +173,8 @@ rig::EulerConvention detail::euler_convention(const dna::Dna& dna) {
 void detail::compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out) {
   const std::vector<bool> flags = quaternion_joints(dna);
   std::vector<std::uint32_t> euler(flags.size(), 0);
-  // Groups in the order of the file, because the last group that rotates a joint wins.
+  // Indices of the groups in the order of the file, because the last group of the file that rotates
+  // a joint counts.
   std::vector<std::uint32_t> file_order(groups.size());
   std::iota(file_order.begin(), file_order.end(), 0u);
   std::ranges::sort(file_order, {}, [&](std::uint32_t i) { return groups[i]; });

@@ -69,10 +69,10 @@ double invert(std::vector<double> m, std::vector<double>& out, std::size_t n) {
   return smallest;
 }
 
-// Inverts the matrix of kernel values between all targets. Targets that differ only by rounding
-// make it singular; then 1e-8 is added to its diagonal. Their poses then share the weight, whereas
-// the reference evaluator gives it to any one of them. A matrix that is still singular is stored
-// itself.
+// Inverts the matrix of kernel values between all targets of a solver. Targets that differ only by
+// rounding make the matrix singular; then 1e-8 is added to its diagonal, so that the poses of these
+// targets share their weight (the reference evaluator gives it to any one of them). If the matrix
+// is still singular, it is stored instead of the inverse.
 void add_inverse(rig::RbfSolver& s, RigData& out) {
   constexpr double kSingular = 1e-10, kRidge = 1e-8;
   const std::size_t n = s.pose_count;
@@ -103,7 +103,7 @@ void add_targets(const dna::RbfSolver& source, rig::RbfSolver& s, RigData& out) 
   }
 }
 
-// The poses of a file, each compiled once: solvers may list a pose any number of times.
+// The poses of a file, each of which is compiled only once, although several solvers may list it.
 class PoseLists {
  public:
   PoseLists(const dna::Dna& dna, RigData& out) : dna_(dna), out_(out) {

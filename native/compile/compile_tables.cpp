@@ -55,8 +55,8 @@ std::vector<rig::ConditionalRow> compile_table(const dna::Conditionals& source) 
   return rows;
 }
 
-// Whether a run of rows adds a value other than 0 if its input is 0. In: begin  first row of the
-// run
+// Whether a run of rows adds a value other than 0 to its output while its input is 0.
+// In: begin  index of the first row of the run
 bool adds_at_rest(const std::vector<rig::ConditionalRow>& rows, std::size_t begin) {
   for (std::size_t i = begin; i < rows[begin].run_end; ++i) {
     const rig::ConditionalRow& row = rows[i];
@@ -102,8 +102,9 @@ bool has_number_bounds(const rig::ConditionalRow& row) {
   return row.from == row.from && row.to == row.to;
 }
 
-// The first row of each row's range: rows of one GUI control with equal bounds form a range. A row
-// with a bound that is NaN is a range of its own. Out: steps  raised by the number of comparisons
+// [rows] the first row of the range to which a row belongs: rows of one GUI control with equal
+// bounds form a range. A row with a bound that is NaN is a range of its own.
+// Out: steps  raised by the number of comparisons
 std::vector<std::uint32_t> first_rows_of_ranges(const std::vector<rig::ConditionalRow>& rows,
                                                 std::uint64_t& steps) {
   std::vector<std::uint32_t> order(rows.size()), first(rows.size());

@@ -27,7 +27,8 @@ struct KeptMatrices {
     std::vector<KeptColumn> columns;
   };
   std::vector<Matrix> matrices;
-  // Values without a column, between columns and behind the last one: first, end.
+  // Ranges (begin, end) of joint_values that belong to no column: between columns, and after the
+  // last column.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> gaps;
   std::size_t size = 0;  // number of values of all columns and gaps
 

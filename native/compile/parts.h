@@ -24,7 +24,8 @@ using rig::RigData;
 /// that LOD.
 using Used = std::vector<std::vector<bool>>;
 
-/// The joint groups of a file in the order of the Rig: groups that coarse LODs use come first.
+/// The joint groups of a file in the order of the Rig: sorted by the coarsest LOD that uses them,
+/// coarsest first.
 using Groups = std::vector<const dna::JointGroup*>;
 
 struct KeptMatrices;  // kept_matrices.h
@@ -57,8 +58,9 @@ std::vector<std::uint32_t> listed(const dna::LodMapping& mapping, std::uint32_t 
 
 rig::EulerConvention euler_convention(const dna::Dna& dna);
 
-// The steps of compile(), in their order. Each reads its layers of the Dna and fills its arrays of
-// `out`; some need arrays that earlier steps filled. Fails: as compile().
+// The steps of compile(), in the order in which it calls them. Each step reads its layers of the
+// Dna and fills its arrays of `out`; some steps need arrays that earlier steps have filled.
+// Fails: as compile().
 
 /// Compiles names, sizes, the convention of Euler angles, the neutral pose, the initial values of
 /// controls and the table of GUI controls. In: budget  limits the sorting of that table
@@ -76,20 +78,20 @@ void compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigDat
 Status compile_solvers(const dna::Dna& dna, Budget& budget, RigData& out, StepLods& lods);
 Status compile_networks(const dna::Dna& dna, Budget& budget, RigData& out, StepLods& lods);
 Status compile_ml_joints(const dna::Dna& dna, RigData& out);
-/// Marks the controls from which the joints that networks move take their values.
+/// Marks in `used` the controls whose values become attributes of the joints that networks move.
 void mark_ml_joints(const RigData& r, Used& used);
 void compile_twist_and_swing(const dna::Dna& dna, RigData& out);
 Status compile_channels_and_maps(const dna::Dna& dna, RigData& out);
 Status compile_psds(const dna::Dna& dna, RigData& out);
 /// Lists the joints that a joint group, a twist or swing setup, or a network moves at any LOD.
 void list_joints_written(RigData& out);
-/// Lists the columns of all joint groups that have a value other than 0.
+/// Lists those columns of all joint groups that have a value other than 0.
 /// In:  finite  true: all numbers of the file are known to be finite; false: they are tested
 /// Out: kept    the columns to store
 ///      used    the controls of the columns are marked, at each LOD at which a column is not 0
 Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatrices& kept,
                        Used& used);
-/// Marks the inputs of blend shape channels and animated maps, up to the row counts of each LOD.
+/// Marks in `used` the controls that blend shape channels and animated maps read at each LOD.
 void mark_channels_and_maps(const RigData& r, Used& used);
 
 /// Chooses the watcher of each corrective, the factor that decides whether it is evaluated, and
@@ -98,8 +100,8 @@ void mark_channels_and_maps(const RigData& r, Used& used);
 ///     lods  the operations and solvers that run at a LOD
 Status schedule(const Used& used, const StepLods& lods, Budget& budget, RigData& out);
 
-/// Adapts the rows to quaternions as output: a joint then has ten attributes, and scale begins one
-/// place later.
+/// Adapts the rows of joint groups to poses with quaternions, in which a joint has ten attributes
+/// and the scale begins at attribute 7 instead of 6. Fails: as compile().
 Status widen_joint_rows(RigData& out);
 /// Finds the rows from which each joint attribute takes its value at each LOD, and the blocks of
 /// attributes that each group writes. Call it after widen_joint_rows, if poses have quaternions.

@@ -105,13 +105,14 @@ class Graph {
     if (!is_psd(n)) return rig::make_step(StepKind::kSolver, n - operations_);
     return rig::make_step(StepKind::kPsd, n - operations_ - solvers_);
   }
-  /// The controls that n writes, each once.
+  /// The controls that node n writes, each listed once.
   std::span<const std::uint32_t> written(std::uint32_t n) const { return written_.of(n); }
-  /// The nodes that read the control, each once.
+  /// The nodes that read the control, each listed once.
   std::span<const std::uint32_t> readers(std::uint32_t control) const {
     return readers_.of(control);
   }
-  /// The nodes that must run after n although they need not read a control that it writes.
+  /// The nodes that must run after node n for another reason than reading a control that n writes;
+  /// see for_edges.
   std::span<const std::uint32_t> after(std::uint32_t n) const { return after_.of(n); }
 
  private:
@@ -228,7 +229,7 @@ class Waiting {
 
   bool is_ready(std::uint32_t n) const { return nodes_[n] == 0; }
 
-  /// Marks n as having run. Calls f(m) for each node that waited only for n.
+  /// Marks node n as having run. Calls f(m) for each node m whose last unmet condition this meets.
   template <class F>
   void finish(std::uint32_t n, F f) {
     const auto done = [&](std::uint32_t m) {
@@ -295,9 +296,9 @@ Early find_early(const Graph& g) {
   return early;
 }
 
-// The watcher of each corrective: the factor whose value decides whether the corrective is
-// evaluated. kNone if a factor may change after the watchers are read, if there is no factor, or if
-// the corrective writes a raw control.
+// [correctives] the watcher of each corrective: the factor whose value decides whether the
+// corrective is evaluated. kNone if a factor may change after the watchers are read, if the
+// corrective has no factor, or if it writes a raw control.
 std::vector<std::uint32_t> choose_watchers(const RigData& r, const Early& early) {
   std::vector<std::uint32_t> load(r.control_count, 0), watchers;
   const auto late = [&](std::uint16_t control) {
@@ -403,8 +404,8 @@ class Costs {
   std::vector<std::uint64_t> layers_, segments_, poses_;  // running sums
 };
 
-// Charges the budget for the operations and solvers of all LODs. If a LOD lists one several times,
-// it is charged each time.
+// Charges the budget for the operations and solvers of all LODs. If a LOD lists an operation or a
+// solver several times, it is charged each time.
 Status take_steps_of_lists(const RigData& r, const StepLods& lods, Budget& budget) {
   const Costs costs(r);
   std::uint64_t operations = 0, solvers = 0;

@@ -15,7 +15,7 @@ std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size, Fill fill) {
   const std::size_t alignment = size >= kLarge ? kLarge : 64;
   void* memory = ::operator new(size, std::align_val_t(alignment));
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
-  // The system may ignore this hint.
+  // A hint to use large pages; the system may ignore it.
   if (alignment == kLarge) madvise(memory, size, MADV_HUGEPAGE);
 #endif
   if (fill == Fill::kZero) std::memset(memory, 0, size);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vectors whose storage begins on a cache line, as kernels need it.
+// Vectors whose storage begins on a cache line (64 bytes), as the compute kernels need it.
 #pragma once
 
 #include <cstddef>

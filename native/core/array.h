@@ -54,8 +54,8 @@ class Array {
   std::shared_ptr<const T> values_;
 };
 
-/// Three (or two) parallel planes of n floats in one buffer: x0..xn-1 y0..yn-1 z0..zn-1, as DNA
-/// files store them. Python sees float32[n, planes] with strides.
+/// kPlanes (2 or 3) parallel planes of n floats in one buffer, for 3 planes x0..xn-1 y0..yn-1
+/// z0..zn-1, as DNA files store them. Python sees float32[n, planes] with strides.
 template <std::size_t kPlanes>
 struct PlanarArray {
   Array<float> values;  // size = kPlanes * count()
@@ -70,9 +70,9 @@ struct PlanarArray {
 using Vec3Array = PlanarArray<3>;
 using Vec2Array = PlanarArray<2>;
 
-/// A list of structs. Copies are deep. Assigning a list replaces its storage; a pointer from
-/// element_ptr() keeps the old storage alive, so that a Python object can still refer to an element
-/// of it.
+/// A list of structs. A copy of a list copies its structs. Assigning a list replaces its storage; a
+/// pointer from element_ptr() keeps the old storage alive, so that a Python object can still refer
+/// to an element of it.
 template <class T>
 class List {
  public:

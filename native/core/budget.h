@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Limits on the memory and the steps of a stage, in proportion to its input; counted, not timed.
+// Limits on the memory and the steps of a stage, in proportion to its input. Steps are counted; no
+// time is measured.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +24,7 @@ class Budget {
       : stage_(std::move(stage)), most_bytes_(most_bytes), most_steps_(most_steps) {}
 
   /// Adds count to the charged bytes. Fails: kLimitExceeded if the sum exceeds most_bytes; the
-  /// error contains the field `where`, the sum and the limit. The count stays charged.
+  /// error contains the field `where`, the sum and the limit. Even then the count stays charged.
   Status take_bytes(std::uint64_t count, const std::string& where) {
     return take(count, bytes_, most_bytes_, "bytes", where);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Memory for numbers that are about to be read from a file, without writing zeros first.
+// An array for numbers that are about to be read from a file; it is not filled with zeros first.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +29,9 @@ class Buffer {
   T* data() { return data_.get(); }
   T& operator[](std::size_t i) { return data_.get()[i]; }
 
-  /// Changes the size and preserves the elements. An empty buffer without memory allocates exactly
-  /// n elements; later growth is at least by half of the capacity. Shrinking keeps the memory.
+  /// Changes the size. Elements below both the old and the new size keep their values. An empty
+  /// buffer without memory allocates exactly n elements; later growth is at least by half of the
+  /// capacity. Shrinking keeps the memory.
   void resize(std::size_t n) {
     if (n > capacity_) allocate(capacity_ == 0 ? n : std::max(n, capacity_ + capacity_ / 2));
     size_ = n;
@@ -38,8 +39,8 @@ class Buffer {
   void reserve(std::size_t n) {
     if (n > capacity_) allocate(n);
   }
-  /// Shrinks the memory to the array's size and returns its ownership. The buffer is empty after
-  /// it.
+  /// Shrinks the memory to the size of the buffer's content and gives it to the caller. The
+  /// buffer is empty afterwards.
   std::shared_ptr<const T> release() {
     if (size_ < capacity_) allocate(size_);
     size_ = capacity_ = 0;

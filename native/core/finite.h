@@ -20,15 +20,15 @@ inline bool is_finite(float value) {
   return non_finite_bit(std::bit_cast<std::uint32_t>(value)) >> 31 == 0;
 }
 
-/// Cost: one pass over all values.
+/// Whether no value is infinite or NaN. Reads all values, without a branch for each.
 inline bool all_finite(std::span<const float> values) {
   std::uint32_t found = 0;
   for (const float value : values) found |= non_finite_bit(std::bit_cast<std::uint32_t>(value));
   return found >> 31 == 0;
 }
 
-/// Like all_finite for floats, but without vectorised code, because lists of doubles are short:
-/// times and points of polylines.
+/// The same for doubles. It ends at the first such value and is not vectorised, because lists of
+/// doubles (times and points of polylines) are short.
 inline bool all_finite(std::span<const double> values) {
   for (const double value : values) {
     if (!std::isfinite(value)) return false;

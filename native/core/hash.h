@@ -7,7 +7,7 @@
 
 namespace risorius::core {
 
-/// The hash XXH64 with seed 0. It is about as fast as reading memory.
+/// The hash XXH64 with seed 0. It takes about as long as reading the bytes from memory.
 std::uint64_t xxh64(std::span<const std::uint8_t> bytes);
 
 }  // namespace risorius::core

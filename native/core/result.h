@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Result<T>: a value or an Error, spelled like std::expected so that C++23 can replace it.
+// Result<T>: a value or an Error. It has the interface of std::expected, so that C++23 can replace
+// it.
 #pragma once
 
 #include <cassert>
@@ -87,7 +88,7 @@ inline Status ok() { return Status(Nothing{}); }
 }  // namespace risorius::core
 
 /// Evaluates a Status or a Result. If it failed, the enclosing function returns the failure;
-/// otherwise the value is dropped.
+/// otherwise execution continues, without the value.
 #define RISORIUS_TRY(expression)                                                \
   do {                                                                          \
     if (auto tried = (expression); !tried) return std::move(tried).propagate(); \

@@ -118,8 +118,8 @@ class Forgetting {
   void inputs(const std::vector<bool>& keep, Array<std::uint16_t>& indices) {
     if (!keep.empty()) indices = renumbered(map_, only(indices, keep));
   }
-  // Removes the factors of correctives that are removed or would always be 0. A corrective is a
-  // product, so that it is 0 if one factor is a removed control.
+  // Removes all factors of each corrective that is itself removed or has a removed factor. A
+  // corrective is a product, and a removed control counts as 0, so that the product is 0.
   void psds() {
     Psds& p = dna_.behavior.psds;
     std::vector<bool> is_lost(map_.size(), false);
@@ -195,8 +195,8 @@ void drop_layer(std::string_view id, Dna& dna) {
   });
   dna.unread_controls = {};
   const ControlCounts after = control_counts(dna);
-  // The last difference is at least 0, although without layer rbfe each pose is a control, so that
-  // removing that layer may raise the number of pose controls.
+  // The difference of the pose controls is limited to 0 and more: without layer rbfe each pose is
+  // a control, so that the number of pose controls may grow when that layer is removed.
   dna.unread_controls = {before.psd - after.psd, before.ml - after.ml,
                          before.rbf_pose - std::min(before.rbf_pose, after.rbf_pose)};
 }

@@ -33,8 +33,9 @@ void drop_layer(std::string_view id, Dna& dna);
 
 /// Removes the unread controls from the control space and renumbers the others, so that the Dna can
 /// be written as a complete file. Everything that an unread control drives is removed, because the
-/// control would remain 0: columns of joint groups, entries of channels and maps, and the factors
-/// of correctives with such a factor. These correctives keep their control, which remains 0.
+/// control would remain 0: columns of joint groups, and entries of channels and maps. A corrective
+/// with an unread control as a factor loses all its factors; it keeps its own control, which
+/// remains 0.
 /// Out:   number of removed columns and entries, and of correctives that lost their factors
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control)
 core::Result<std::size_t> forget_unread_controls(Dna& dna);

@@ -66,17 +66,18 @@ struct Definition {
   bool operator==(const Definition&) const = default;
 };
 
-/// Rows of a table, as six parallel lists. A row adds slope * in + cut to its output if from <= in
-/// <= to.
+/// Rows of a table, as six parallel lists. A row adds slope * in + cut to its output if its
+/// input `in` satisfies from <= in <= to.
 struct Conditionals {
   Array<std::uint16_t> input_indices, output_indices;
   Array<float> from_values, to_values, slope_values, cut_values;
   bool operator==(const Conditionals&) const = default;
 };
 
-/// Correctives, as a sparse matrix in coordinate form. Each entry gives a corrective (row, its
-/// control index) a factor (column, the factor's control index). The product of a corrective's
-/// values is its weight: the corrective is min(1, weight * product of its factors).
+/// Correctives, as a sparse matrix in coordinate form. Each entry gives a corrective one factor:
+/// row is the control index of the corrective, column that of the factor. The weight of a
+/// corrective is the product of the values of its entries: the corrective is min(1, weight *
+/// product of its factors).
 struct Psds {
   Array<std::uint16_t> rows, columns;
   Array<float> values;
@@ -229,8 +230,8 @@ struct RbfBehavior {
   bool operator==(const RbfBehavior&) const = default;
 };
 
-/// The output controls of a pose of layer rbfb. To each, the pose adds its output weight times the
-/// pose's value times the product of the input controls.
+/// The output controls of a pose of layer rbfb. The pose adds to each output control: the weight of
+/// that output, times the pose's value, times the product of the input controls.
 struct RbfPoseControls {
   Array<std::uint16_t> input_control_indices, output_control_indices;
   Array<float> output_control_weights;
@@ -287,7 +288,7 @@ struct Warning {
   bool operator==(const Warning&) const = default;
 };
 
-/// The number of controls in layers that were not loaded. These controls keep their places in the
+/// The numbers of controls in layers that were not loaded. These controls keep their indices in the
 /// control space raw | corrective | network | RBF pose.
 struct UnreadControls {
   std::uint32_t psd = 0, ml = 0, rbf_pose = 0;
@@ -309,8 +310,8 @@ struct Dna {
   TwistSwingBehavior twist_swing_behavior;
   UnreadControls unread_controls;
   std::vector<UnknownLayer> unknown_layers;
-  /// Layer ids in the order of the source file, so that a rewrite has the same order; "" stands for
-  /// the next unknown layer.
+  /// Layer ids in the order of the source file's index, so that a written file has the same order;
+  /// "" stands for the next element of unknown_layers.
   std::vector<std::string> index_order;
   std::vector<Warning> warnings;
 };

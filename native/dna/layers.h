@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The table of the format's layers, in the order in which a writer appends them.
+// The table of the format's layers, in the order in which a writer appends the layers that are not
+// in the index of the source file.
 #pragma once
 
 #include <array>
@@ -34,8 +35,8 @@ inline const KnownLayer* find_layer(const LayerId& id, std::uint32_t version) {
   return nullptr;
 }
 
-/// Calls f(id, field name, struct) for each layer that has a struct in Dna, in the order of
-/// kLayers. dsce is last, because its bytes depend on the file's version.
+/// Calls f(id, field name, struct) for each layer that has a struct in Dna, in the order of the
+/// table kLayers.
 template <class D, class F>
 void for_each_layer(D& dna, F f) {
   f("desc", "descriptor", dna.descriptor);

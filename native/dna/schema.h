@@ -5,9 +5,9 @@
 // A visitor has
 //   field(name, value)              numbers, texts, Arrays, lists of them, structs with a describe
 //   group(name, body)               a struct of the format that Dna lacks; only JSON nests it
-//   sized(name, list, mapping)      a list whose elements are preceded by their size in bytes (in
-//                                   2.1, meshes: by their end's offset); mapping lists the
-//                                   elements that each LOD needs, or is null
+//   sized(name, list, mapping)      a list whose elements are preceded by their size in bytes
+//                                   (meshes of a 2.1 file: by the offset of their end); mapping
+//                                   lists the elements that each LOD needs, or is null
 //   faces(mesh), skin(mesh), targets(mesh)   lists that Dna keeps flat, or that a LOD may drop
 //   setups(name, list, twist)       lists of describe_setup
 //   matrix(name, joint group)       the values of a joint group; a reader may leave out rows

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The size of a Dna, from which the limits of later stages are computed.
+// The size of a Dna, from which the limits of memory and work for its compilation are computed.
 #pragma once
 
 #include <cstdint>

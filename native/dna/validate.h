@@ -16,7 +16,7 @@ struct Finding {
 };
 
 /// Checks that parallel lists have one length, that every index is in range, that the joint
-/// hierarchy has no cycle, and that LOD rows fit their matrix.
+/// hierarchy has no cycle, and that no LOD uses more rows than its matrix has.
 /// In/out: warnings  gets the oddities that can be read safely
 /// Fails: kInvalidLength, kInvalidIndex, kInvalidValue, with the field and no offset
 core::Status validate(const Dna& dna, std::vector<Warning>& warnings);

@@ -10,7 +10,8 @@
 namespace risorius::dna::detail {
 
 /// A field's name such as "geometry.meshes[3].positions[7]", stored as a few pointers: a check uses
-/// thousands of names and rarely needs one as text. In: names that live as long as the program
+/// thousands of names and rarely needs one as text. The pointers are not copied, so pass string
+/// literals.
 class Where {
  public:
   Where(const char* name) { add({name, kNone}); }

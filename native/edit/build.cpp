@@ -26,17 +26,17 @@ constexpr std::size_t kMost = 65535;  // rows or columns
 // write the same row, the later one wins.
 struct GroupKey {
   std::uint32_t below;  // highest layer - layer, so that higher layers come first
-  // levels: the number of LODs of each unit of the group if units with another number of LODs must
-  // not be in it, because they would change the order of its columns; else 0. region is 0 for a
-  // bundle, which may have joints of several regions.
+  // levels: 0, or the number of LODs that use each unit of the group. It is not 0 if units that
+  // other numbers of LODs use would change the order of the group's columns, and are therefore in
+  // other groups. region: 0 for a bundle, which may have joints of several regions.
   std::uint32_t region, chain, bundle, order, levels;
   auto operator<=>(const GroupKey&) const = default;
 };
 using Members = std::map<GroupKey, std::vector<const Unit*>>;
 
 // The columns of a new group, and the place of each unit's columns among them. Columns that rotate
-// quaternion joints come first, in the order in which their rotations are multiplied
-// (compile::quaternion_column_order keeps it).
+// quaternion joints come first, in the order in which their rotations are multiplied. The compiler
+// keeps this order (compile::quaternion_column_order).
 class Columns {
  public:
   explicit Columns(const std::vector<const Unit*>& units) {
@@ -82,7 +82,8 @@ class Columns {
     }
   }
 
-  // The largest number of LODs at which each column rotates a quaternion joint.
+  // For each column, the number of LODs at which it rotates a quaternion joint; the largest of
+  // these numbers if the column rotates several quaternion joints.
   std::vector<std::uint32_t> levels_of(const std::vector<const Unit*>& units) const {
     std::vector<std::uint32_t> levels(controls_.size(), 0);
     for (const Unit* u : units) {
@@ -122,8 +123,9 @@ class Columns {
 };
 
 // All quaternion joints of a group share the order of its columns, in which columns with more LODs
-// come first. If that changes the order for one of them, the units are divided into groups of equal
-// numbers of LODs, in which no column is moved.
+// come first. If this order differs from the order that one of the joints needs, the units are
+// divided into groups whose units are all used by the same number of LODs. In such a group the
+// number of LODs moves no column.
 Members separated(const Members& groups) {
   Members out;
   for (const auto& [key, list] : groups) {
@@ -149,7 +151,8 @@ Members list_members(const std::vector<Unit>& units, const Regions& regions) {
     if (u.order != kAnyOrder) out[key(u, u.order)].push_back(&u);
   }
   out = separated(out);
-  // Units whose columns may have any order join a group with a fixed order, if there is one.
+  // Units whose columns may have any order join a group with a fixed order, if there is such a
+  // group with the same layer, region, chain and bundle.
   Members free;
   for (const Unit& u : units) {
     if (u.order == kAnyOrder) free[key(u, kAnyOrder)].push_back(&u);

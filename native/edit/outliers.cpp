@@ -30,7 +30,8 @@ class Uses {
       }
     }
   }
-  /// Removes one use. False, without removing it, if it is the last use at some LOD.
+  /// Removes one use of a control by a row. Returns false, and removes nothing, if it is the last
+  /// use of the control at some LOD.
   bool take(std::uint16_t control, const Row& row) {
     if (!watched_[control]) return true;
     for (std::uint32_t l = 0; l < lods_; ++l) {
@@ -66,7 +67,8 @@ class Uses {
   std::vector<std::int64_t> counts_;  // [controls, LODs]
 };
 
-// [controls] how many joints of a region each control moves. In: units  of the region, by joint
+// [controls] how many joints of a region each control moves.
+// In: units  the units of the region, sorted by joint
 std::vector<std::uint32_t> count_joints(const std::vector<const Unit*>& units,
                                         std::size_t controls) {
   std::vector<std::uint32_t> counts(controls, 0), last(controls, UINT32_MAX);
@@ -80,7 +82,7 @@ std::vector<std::uint32_t> count_joints(const std::vector<const Unit*>& units,
   return counts;
 }
 
-// Removes columns of a unit of one row. In: keep  [columns]
+// Removes columns of a unit of one row. In: keep  [columns] whether each column stays
 void keep_columns(const std::vector<bool>& keep, Unit& u) {
   std::size_t n = 0;
   for (std::size_t c = 0; c < keep.size(); ++c) {
@@ -131,9 +133,9 @@ void remove_zero_rows(std::vector<Unit>& units) {
     while (i < units.size() && units[i].joint == units[begin].joint) ++i;
     const auto first = units.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = units.begin() + static_cast<std::ptrdiff_t>(i);
-    // No row is removed if one of the joint's units has an overwritten layer, because a row of
-    // zeros may be the one that overwrites another. At least one row of a joint is kept, so that
-    // the rig knows that the joint may move.
+    // No row is removed if a unit of the joint overwrites another unit at some LOD, because the
+    // overwriting row may be a row of zeros. At least one row of a joint is kept, so that the rig
+    // knows that the joint may move.
     const bool layered = std::any_of(first, last, [](const Unit& u) { return u.layer > 0; });
     const auto goes = [&](const Unit& u) { return u.is_zero() && !u.is_quaternion && !layered; };
     auto kept = std::count_if(first, last, [&](const Unit& u) { return !goes(u); });

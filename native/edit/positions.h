@@ -36,7 +36,7 @@ class Skeleton {
   /// A joint's transform relative to its parent in a pose. In: delta  tx ty tz rx ry rz sx sy sz,
   /// the joint's attributes in the pose
   Local local(std::size_t joint, const float* delta) const;
-  /// Computes positions in the face. In: locals  of all joints
+  /// Computes the positions of all joints in the face. In: locals  [joints]
   /// Out: positions  [joints], in the file's units and axes
   void place(const std::vector<Local>& locals, std::vector<Vector>& positions) const;
 

@@ -16,9 +16,10 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// Cost of a column in addition to its rows, in rows. Measured by evaluation time it is about 50 (a
-// noisy face in 1 and in 464 groups), by file size it is 0. Any value from 8 to 64 gives a
-// full-scale face the same groups.
+// The fixed cost of a column: a column of n rows costs as much as n + kColumnOverhead coefficients.
+// In evaluation time the fixed cost is about 50 coefficients (measured on a noisy face in 1 and in
+// 464 groups); in file size it is 0. Any value from 8 to 64 gives a full-scale face the same
+// groups.
 constexpr std::int64_t kColumnOverhead = 8;
 // Clusters are merged until there is at most one for each kJointsOfGroup joints; kFewGroups
 // clusters are always allowed. Without this limit, joints that share few controls would end in many

@@ -76,9 +76,10 @@ struct Regrouped {
 /// is used at the same LODs as before.
 ///
 /// Joints with quaternions keep every coefficient and the order in which their rotations are
-/// multiplied. A region gets several groups if several groups write one row, if LODs do not nest,
-/// or if columns of quaternions need different orders. A corrective that other parts of the rig
-/// read remains in use at each LOD where it is used.
+/// multiplied. A region gets several groups if several source groups write the same attribute of a
+/// joint, if a LOD uses rows that a finer LOD does not use, or if columns of quaternions need
+/// different orders. A corrective that other parts of the rig read remains in use at each LOD where
+/// it is used.
 ///
 /// Fails: kInvalidArgument, kInvalidIndex (regions, options), kLimitExceeded (the dense groups of a
 ///        region do not fit the format), and as validate and compile.

@@ -72,7 +72,8 @@ void take_rotation(const dna::JointGroup& g, std::uint32_t group,
   unit.order = is_ascending(unit.columns) ? kAscending : kOfGroup + group;
 }
 
-// Completes the units of the quaternion joints of a group. In: turned  joint -> number of its unit
+// Adds the columns and values of the rotations of a group to the units of its quaternion joints.
+// In: turned  joint -> number of its unit
 void take_rotations(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>& quaternions,
                     const std::map<std::uint32_t, std::size_t>& turned, std::vector<Unit>& units) {
   if (turned.empty()) return;
@@ -119,7 +120,7 @@ void add_group(const dna::Dna& dna, std::uint32_t index, const std::vector<bool>
   take_rotations(dna, index, quaternions, turned, out);
 }
 
-// [LODs] whether each LOD uses a row, finest first.
+// [LODs] for each LOD whether it uses a row; the finest LOD is first.
 std::vector<bool> lods_of(const dna::Dna& dna, const Row& row) {
   std::vector<bool> out(dna.descriptor.lod_count);
   const auto& lods = dna.behavior.joint_groups[row.group].lods;
@@ -128,8 +129,8 @@ std::vector<bool> lods_of(const dna::Dna& dna, const Row& row) {
 }
 
 // Puts units whose rows skip a LOD into chains. Usually each row is used from LOD 0 up to some LOD.
-// A unit whose rows skip a LOD can share a group only with units whose rows skip the same LODs, the
-// units of its chain.
+// A unit with a row that skips a LOD can share a group only with units whose rows are used at the
+// same LODs. These units are one chain.
 void find_chains(const dna::Dna& dna, std::vector<Unit>& units) {
   std::map<std::vector<std::vector<bool>>, std::vector<Unit*>> chains;
   for (Unit& unit : units) {
@@ -156,8 +157,9 @@ std::uint32_t key_of(const Unit& unit) {
   return unit.is_quaternion && rotates(output) ? unit.joint * 9u + 3u : output;
 }
 
-// The row that decides whether a unit is written at a LOD. If one of a joint's rotation attributes
-// has two rows, only the later row counts; among the attributes, the first row does.
+// The row that decides whether a unit is written at a LOD. A later row of the unit overwrites an
+// earlier row that writes the same rotation attribute. Of the rows that are not overwritten, the
+// first one decides.
 const Row& deciding_row(const Unit& unit) {
   const Row* first = nullptr;
   for (std::size_t i = 0; i < unit.rows.size(); ++i) {

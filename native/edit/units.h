@@ -26,11 +26,12 @@ struct Unit {
   std::uint32_t joint = 0;
   // Whether the joint is a quaternion joint. None of its coefficients counts as small.
   bool is_quaternion = false;
-  // 0, or more than the layer of each later unit that writes the same output.
+  // Position among the units that write the same output, counted from the last one, which has 0.
+  // The units of a bundle all have the highest of their positions.
   std::uint32_t layer = 0;
-  // 0 if every row is used from LOD 0 up to some LOD, or if the unit is in a bundle. Units of
-  // different chains never share a group, because the sets of LODs that use their rows need not
-  // nest in each other.
+  // Number of the unit's chain: units whose rows skip the same LODs. 0 if every row is used from
+  // LOD 0 up to some LOD, or if the unit is in a bundle. Units of different chains never share a
+  // group, because a group stores one row count for each LOD and cannot skip a single row.
   std::uint32_t chain = 0;
   std::uint32_t order = kAnyOrder;
   // Units of one bundle form a group without other units; 0: no bundle. If the rotation rows of a

@@ -50,8 +50,8 @@ struct RegisterOptions {
   std::vector<std::uint8_t> trusted;
   /// [template vertices] the mirror vertex, in the middle the vertex itself; empty: no symmetry.
   std::vector<std::uint32_t> mirrored;
-  /// In the coarse steps, each vertex also gets its mirror vertex's match, reflected, with this
-  /// factor of its weight; 0: no symmetry.
+  /// In the coarse steps, each vertex also gets the reflected match of its mirror vertex, whose
+  /// weight is multiplied by this factor; 0: no symmetry.
   double symmetry = 0.0;
   std::size_t nodes = 2000;  // number of nodes of the coarse steps
   double noise = 2.0;        // expected error of the points of pairs in mm

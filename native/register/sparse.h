@@ -30,7 +30,7 @@ class SparseCholesky {
   std::size_t size() const;
   /// Solves systems with several right sides.
   /// In: right    [size][sides] right sides in row-major order
-  ///     threads  0: one for each core; each solves some of the sides
+  ///     threads  number of threads, each of which solves some of the systems; 0: one for each core
   /// Returns the solutions [size][sides]. Fails: kInvalidLength (right)
   core::Result<std::vector<double>> solve(std::span<const double> right, std::size_t sides,
                                           std::size_t threads = 0) const;

@@ -63,8 +63,8 @@ struct Watch {
 /// A joint group: a dense matrix that turns some controls into some joint attributes.
 ///
 /// The matrix is stored column by column, a column for each control, in joint_values or
-/// joint_halves. The columns of one control in all groups are stored one after the other, so that a
-/// control is one run of memory. Columns of at least kWidest (16) rows begin at a multiple of
+/// joint_halves. The columns of one control in all groups are stored one after the other, so that
+/// they are one run of memory. Columns of at least kWidest (16) rows begin at a multiple of
 /// kWidest values; shorter columns have no padding.
 struct JointGroup {
   std::uint32_t row_count = 0;
@@ -135,8 +135,9 @@ struct RbfSolver {
   std::uint32_t always_normalize = 0;
 };
 
-/// A pose of a solver. To each output control it adds weight * value * the product of its inputs;
-/// value is the weight that the solver gives the pose.
+/// A pose of a solver. To each output control it adds weight * value * the product of the pose's
+/// input controls; weight is a constant of the output, and value is the weight that the solver
+/// gives the pose.
 struct RbfPose {
   std::uint32_t inputs_begin = 0, input_count = 0;    // controls in rbf_pose_inputs
   std::uint32_t outputs_begin = 0, output_count = 0;  // in rbf_outputs
@@ -308,7 +309,7 @@ struct RigArrays {
   A<std::uint16_t> joint_outputs;     // [rows of all groups]: the joint attribute of each row
   // How rows are copied to joint attributes. The attributes are divided into blocks of 16. For each
   // LOD and block one piece tells which attributes take values and at which row these values begin.
-  // Attributes whose values are not in the following rows have extra pieces.
+  // Attributes of the block whose values are not in these consecutive rows have extra pieces.
   A<simd::Piece> joint_pieces;    // [LODs, blocks]
   A<std::uint32_t> extra_begins;  // [LODs + 1]
   A<simd::Piece> extra_pieces;

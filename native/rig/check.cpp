@@ -126,7 +126,7 @@ void check_groups(const Rig& r, IndexCheck& c) {
     ++columns[column.group];
     const std::uint64_t end =
         column.offset + simd::rounded_up(r.joint_groups[column.group].row_count);
-    // The first value is read even if the column has no rows.
+    // Evaluation reads the first value of a column even if the column has no rows.
     c.demand("joint_columns", end <= values && column.offset < values);
   }
   check_group_columns(r, values, c);
@@ -358,7 +358,7 @@ void check_gui_ranges(const Rig& r, IndexCheck& c) {
   c.below("gui_range_rows", r.gui_range_rows, r.gui_rows.size(), [](std::uint32_t v) { return v; });
 }
 
-// Whether the first `count` values are consecutive.
+// Whether the first `count` values are consecutive integers, each one more than the value before.
 bool is_run(View<std::uint16_t> list, std::size_t count) {
   if (count > list.size()) return false;
   for (std::size_t i = 1; i < count; ++i) {

@@ -6,8 +6,8 @@ namespace risorius::rig {
 
 namespace {
 
-// The rows of each group at each LOD, as the kernels add them: groups of at least kWidest rows take
-// whole vectors.
+// The rows of each group at each LOD that the kernels compute: in groups of at least kWidest (16)
+// rows, their number is rounded up to whole vectors.
 std::vector<simd::Rows> rows_of_groups(const Rig& rig) {
   std::vector<simd::Rows> all;
   for (std::uint32_t l = 0; l < rig.lod_count; ++l) {

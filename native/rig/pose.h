@@ -112,7 +112,8 @@ struct alignas(128) Workspace {
   // content of the pose is unknown.
   std::vector<std::uint64_t> shown_blocks;
   // Rotations by quaternions.
-  // If poses have quaternions: the joints that no Euler angles turn at any LOD.
+  // If poses have quaternions: the joints whose quaternion is not computed from Euler angles at any
+  // LOD. If poses have Euler angles: empty.
   std::vector<std::uint16_t> straight_joints;
   std::vector<Quaternion> products;  // [quaternion joints]
   // A bit for each column of Rig::quaternion_columns: 1 if the column's control is not 0. All bits
@@ -131,8 +132,8 @@ struct alignas(128) Workspace {
   core::AlignedVector<float> frame_weights;
 };
 
-/// Make a pose and a workspace of the sizes that the rig needs. All values of the pose are 0; all
-/// masks of the workspace are 1.
+/// These two functions make a pose and a workspace of the sizes that the rig needs. All values of
+/// the pose are 0; all masks of the workspace are 1.
 Pose make_pose(const Rig& rig);
 Workspace make_workspace(const Rig& rig);
 /// A workspace for evaluate_frames; evaluate can use it too.

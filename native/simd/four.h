@@ -12,8 +12,9 @@
 
 namespace risorius::simd {
 
-/// Four float32, on x86-64 and ARM in one register. If one of them is NaN, its result is NaN, also
-/// of at_least and at_most, whose limit must not be NaN.
+/// Four float32, on x86-64 and ARM in one register. If one of the four numbers is NaN, the result
+/// of an operation with this number is NaN. This includes at_least and at_most, whose limit must
+/// not be NaN.
 #if defined(__x86_64__) || defined(_M_X64)
 struct Four {
   __m128 v;

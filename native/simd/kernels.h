@@ -9,10 +9,10 @@
 
 namespace risorius::simd {
 
-/// Floats in the widest vector. Kernels compute whole vectors: the columns of a matrix need no
-/// padding, a kernel then also reads the first values of the next column, and its caller ignores
-/// the results behind the last row. Therefore kWidest values after the last one of a matrix must be
-/// readable, and results need room for rounded_up(rows) floats.
+/// Number of floats in the widest vector. Kernels compute whole vectors. The columns of a matrix
+/// need no padding: at the end of a column, a kernel also reads the first values of the next
+/// column, and its caller ignores the results behind the last row. Therefore kWidest values after
+/// the last value of a matrix must be readable, and results need room for rounded_up(rows) floats.
 inline constexpr std::size_t kWidest = 16;
 template <class T>
 constexpr T rounded_up(T rows) {
@@ -132,7 +132,7 @@ struct Kernels {
                              std::size_t rows);
   /// Fills n consecutive blocks of kPlaces places in each frame, block i as pieces[i] tells: places
   /// whose bit is set in the mask get values, all others get 0.
-  /// In: frames.from  kPlaces values are readable from the first value of any piece on
+  /// In: frames.from  from the first value of each piece on, kPlaces values must be readable
   void (*place)(const Piece* pieces, std::size_t n, const PlacedFrames& frames);
   /// Like place, but piece i goes to block pieces[i].block, and the places whose bit is not set
   /// keep their values; they may be read and rewritten.
@@ -180,7 +180,7 @@ const Kernels* avx2_kernels();    // with FMA and F16C
 const Kernels* avx512_kernels();  // F, BW, DQ, VL
 const Kernels* neon_kernels();
 
-/// Whether CPU and operating system support the instructions.
+/// Whether CPU and operating system support the instruction set in the name of the function.
 bool cpu_has_sse4();    // 4.1
 bool cpu_has_avx2();    // with FMA and F16C
 bool cpu_has_avx512();  // F, BW, DQ, VL

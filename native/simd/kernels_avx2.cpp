@@ -148,7 +148,8 @@ struct V {
     expand_8(from, o.high, zero(), to + 8);
   }
   // Places without a value are rewritten with their old values, because a masked store takes 12
-  // cycles on some CPUs. Two of three extra pieces touch only one half.
+  // cycles on some CPUs. Two thirds of the extra pieces write only
+  // places in one half of a block.
   RISORIUS_INLINE static void expand_more(const float* from, const Order& o, float* to) {
     if (o.low.any) expand_8(from, o.low, load(to), to);
     if (o.high.any) expand_8(from, o.high, load(to + 8), to + 8);

@@ -87,7 +87,8 @@ struct RowsOfFour {
   RISORIUS_INLINE static void pack(const float* matrix, float* row) { pack_rows(matrix, row); }
 };
 
-// Products and sums are rounded separately, as in the scalar functions.
+// The vectors of kernels_body.h. madd() rounds the product and the sum separately, as the scalar
+// functions do, so that the bits are the same.
 struct V {
   using Parts = FourByFour;
   using Skin = RowsOfFour;

@@ -36,7 +36,7 @@ RISORIUS_INLINE float near_cosine(float z) {
 }
 
 // Sine and cosine of angles in radians, reduced by quarter turns. The error is below 1e-7 for
-// angles up to kReduced; repair() replaces the results of larger angles.
+// angles up to kReduced (8,192 radians); repair() replaces the results of larger angles.
 RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   constexpr float kRound = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer
   for (std::size_t l = 0; l < kAngles; ++l) {
@@ -51,8 +51,8 @@ RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cos
     cosines[l] = std::bit_cast<float>(((cb & ~swap) | (sb & swap)) ^ (((n + 1u) & 2u) << 30));
   }
 }
-// As sine_and_cosine, for angles of at most kNear, which need no reduction: the same bits in half
-// the time. Faces rarely rotate a joint so far that an angle needs a reduction.
+// As sine_and_cosine, for angles of at most kNear (0.785 radians), which need no reduction: the
+// same bits in half the time. Faces rarely rotate a joint so far that an angle needs a reduction.
 RISORIUS_INLINE void near_sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   for (std::size_t l = 0; l < kAngles; ++l) {
     const float z = x[l] * x[l];
@@ -63,7 +63,8 @@ RISORIUS_INLINE void near_sine_and_cosine(const Angles& x, Angles& sines, Angles
 
 constexpr float kNear = 0.785f;      // radians, slightly less than an eighth of a turn
 constexpr float kReduced = 8192.0f;  // radians, largest angle that is reduced exactly enough
-// Replaces the results of angles above kReduced, infinity and NaN by the C library's.
+// For angles that are above kReduced, infinite or NaN: replaces sine and cosine by the results of
+// the C library.
 void repair(const Angles& x, Angles& sines, Angles& cosines) {
   for (std::size_t l = 0; l < kAngles; ++l) {
     if (std::fabs(x[l]) <= kReduced) continue;
@@ -153,9 +154,10 @@ RISORIUS_INLINE bool turns(const float* angles) {
   return (two | third) != 0;
 }
 
-// Lists in `turning` the rotations that are not 0, and writes quaternions of no rotation for the
-// others. A batch of sixteen is computed only when 32 more have been listed, because the CPU would
-// otherwise have to wait for the entries of the list that it has just written.
+// Converts Euler angles to quaternions. Lists in `turning` the rotations that are not 0, which are
+// converted in batches, and writes the identity for all others. A batch of sixteen is computed only
+// when 32 more have been listed, because the CPU would otherwise have to wait for the entries of
+// the list that it has just written.
 template <class Parts>
 RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which, std::size_t n,
                                  float* rotations, std::size_t stride) {

@@ -28,7 +28,7 @@ RISORIUS_INLINE void add_four(typename S::Sum& sum, const float* rows, const std
                               const float* weights, std::index_sequence<kInfluence...>) {
   const typename S::Weights all = S::weights(weights);
   if constexpr (S::kTogether == kSkinGroup && std::endian::native == std::endian::little) {
-    // One read for four bones, because reads take most of the time.
+    // One read gets the indices of all four bones, because reads take most of the time.
     std::uint64_t four;
     std::memcpy(&four, bones, sizeof four);
     (S::template add<kInfluence>(

@@ -41,7 +41,9 @@ struct Jacobian {
 /// memory.
 class Probe {
  public:
-  /// In: points  vertices that exist; surface  must outlive the probe
+  /// Prepares computations for some points.
+  /// In: surface  the face's surface, which must outlive the probe
+  ///     points   vertices of this surface; each must exist
   Probe(const Surface& surface, std::span<const Point> points);
 
   std::size_t size() const { return points_.size(); }

@@ -144,7 +144,7 @@ def cpp_around(lines: list[str], number: int) -> str:
 
 
 def _goes_on(line: str, indent: int) -> bool:
-    """Whether a line with this indentation is the begin of a declaration that continues."""
+    """Whether a line has the indentation `indent` and its declaration goes on in the next line."""
     return _indent(line) == indent and bool(_CONTINUES.search(line)) and "//" not in line
 
 
@@ -200,12 +200,12 @@ def page_sentences(path: Path) -> Iterator[Item]:
 
 
 def _indented(block: re.Match[str]) -> str:
-    """A fenced block of code as an indented one, which the sentence before it may show."""
+    """A fenced code block as an indented one, so that a sentence before it shows it as context."""
     return "\n" + "".join(f"    {line}\n" for line in block[1].splitlines()) + "\n"
 
 
 def interface_sentences() -> Iterator[Item]:
-    """Labels, tooltips and messages of the extension, which the German table lists."""
+    """Labels, tooltips and messages of the extension. The German translation lists all of them."""
     table = PROJECT / "addon/risorius/language/interface_de.toml"
     listed = tomllib.loads(table.read_text(encoding="utf-8")).values()
     texts = {text for some in listed for text in some if len(text.split()) > 3}

@@ -3,7 +3,9 @@
 
 A use is the kind of the text (label, tooltip, message), with the names that a user sees around it:
 the label of the operator, panel or property, and the panels that contain the button or the value.
-Descriptions of the class, the function and the file stand for the user's situation.
+The
+descriptions of the class, the function and the file are added, because they explain in which
+situation a user sees the text.
 """
 
 import ast
@@ -62,7 +64,7 @@ def uses_in(paths: list[Path], texts: set[str]) -> dict[str, list[Use]]:
 
 
 def _panels(sources: list[Source]) -> dict[str, set[str]]:
-    """Labels of the panels that show a property or an operator, by its name in the code."""
+    """Name of a property or an operator in the code -> labels of the panels that show it."""
     out: dict[str, set[str]] = defaultdict(set)
     for source in sources:
         for node in ast.walk(source.tree):
@@ -77,7 +79,7 @@ def _panels(sources: list[Source]) -> dict[str, set[str]]:
 
 
 def _kind(source: Source, node: ast.Constant) -> str:
-    """The kind of text of a literal, with the label of the property or the choice."""
+    """The kind of a text, such as "label"; a tooltip also names its property or choice."""
     inner: ast.AST = node
     for outer in source.around(node):
         if isinstance(outer, ast.keyword) and outer.arg in _LABELS | {"description"}:
@@ -126,7 +128,7 @@ def _kind_of_argument(source: Source, argument: ast.keyword) -> str:
 
 
 def _kind_by_function(source: Source, node: ast.AST) -> str:
-    """The kind of a text without a keyword: `poll` explains a button that is greyed out."""
+    """The kind of a text, from the call or function around it, for example `poll`."""
     for outer in source.around(node):
         if isinstance(outer, ast.Raise):
             return "message"
@@ -179,7 +181,10 @@ def _constant(source: Source, node: ast.Constant) -> Iterator[str]:
 
 
 def _code_names(node: ast.AST) -> list[str]:
-    """The names by which a panel shows a property or an operator."""
+    """The name of a property, or the bl_idname of an operator, by which panels refer to it.
+
+    Empty for nodes that define neither.
+    """
     if isinstance(node, ast.AnnAssign):
         return [ast.unparse(node.target)]
     return [_value(node, "bl_idname")] if isinstance(node, ast.ClassDef) else []

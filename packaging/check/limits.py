@@ -25,8 +25,8 @@ from pathlib import Path
 from typing import Any
 
 STILL = 300.0  # wall time in seconds in which a command must use LEAST_SHARE of a core
-# Least fraction of a core that a command must use. Beside twenty other jobs, a process of low
-# priority still gets six times as much.
+# Least fraction of a core that a command must use; a command that uses less hangs. Beside twenty
+# other jobs, a process of low priority still gets 0.03, six times this fraction.
 LEAST_SHARE = 0.005
 LOOK = 1.0  # seconds between two checks
 KILLED = 128 + 9
@@ -85,14 +85,14 @@ class Watch:
         self._since, self._then = time.monotonic(), 0.0
 
     def look(self) -> None:
-        """Check the limits once. Raises Exceeded, after killing all processes, at a limit."""
+        """Check the limits once. If one is exceeded, kill all processes and raise Exceeded."""
         now = time.monotonic()
         if not _PROC.is_dir():
             if now - self._since > 10 * self.cpu + self.still:
                 self._stop(f"after {now - self._since:.0f} s by the clock")
             return
-        # The total falls if a child ends and no process waits for it. `used` keeps the child's
-        # seconds.
+        # The seconds of a child leave the total if it ends and no process waits for it. So only
+        # increases of the total are added to `used`.
         total = sum(map(_seconds, _family(self.process.pid).values()))
         self.used, self._total = self.used + max(0.0, total - self._total), total
         if self.used > self.cpu:
@@ -124,7 +124,13 @@ def _own_session() -> dict[str, bool]:
 
 
 def _family(leader: int) -> dict[int, list[str]]:
-    """Process id -> fields of _fields(), for a session's processes and its leader's descendants."""
+    """Process id -> result of _fields(), for all processes of a session.
+
+    Descendants of the session's leader that have left the session are included.
+
+    Args:
+        leader: process id of the leader, which is also the id of the session.
+    """
     known: dict[int, list[str]] = {}
     for entry in os.listdir("/proc") if _PROC.is_dir() else ():
         if entry.isdecimal() and (fields := _fields(int(entry))):
@@ -146,7 +152,11 @@ def _fields(pid: int) -> list[str]:
 
 
 def _seconds(fields: list[str]) -> float:
-    """CPU seconds of a process and of its children that have ended. Args: fields  of _fields()."""
+    """CPU seconds of a process and of its children that have ended.
+
+    Args:
+        fields: result of _fields() for the process.
+    """
     return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 

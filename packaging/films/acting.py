@@ -20,7 +20,7 @@ TRACKS = {
     "browRaiseIn*": [(30, 0), (35, 0.55), (42, 0.25), (50, 0.1), (58, 0.35), (64, 0), (96, 0)],
     "browRaiseOuterL": [(30, 0), (36, 0.5), (44, 0.2), (52, 0), (96, 0)],
     "browRaiseOuterR": [(30, 0), (36, 0.3), (44, 0.15), (52, 0), (96, 0)],
-    # A smile that begins on one side.
+    # A smile that begins on the left side.
     "mouthCornerPullL": [
         (26, 0),
         (34, 0.95),
@@ -118,7 +118,7 @@ TRACKS = {
     "mouthPressU*": [(52, 0), (54, 0.35), (56, 0), (64, 0), (67, 0.4), (70, 0), (96, 0)],
     "mouthPressD*": [(52, 0), (54, 0.35), (56, 0), (64, 0), (67, 0.4), (70, 0), (96, 0)],
     "mouthLowerLipRollIn*": [(60, 0), (62, 0.45), (64, 0), (96, 0)],
-    # An angry shout, with the controls that this face has.
+    # An angry shout. Tracks without a control of the demo's face have no effect.
     "jawOpenExtreme": [(70, 0), (76, 0.9), (88, 1.0), (96, 0.6)],
     "neckStretch*": [(68, 0), (76, 0.9), (88, 1.0), (96, 0.7)],
     "noseWrinkle*": [(64, 0), (70, 0.5), (76, 1.0), (90, 0.9), (96, 0.7)],
@@ -186,7 +186,16 @@ def expand(name: str, available: set[str], prefix: str) -> list[str]:
 def tracks(
     available: set[str], prefix: str = "CTRL_expressions."
 ) -> tuple[dict[str, list[tuple[float, float]]], list[str]]:
-    """Control name -> keyframes, and the names of the tracks without a control of the character."""
+    """The keyframes for a character's controls.
+
+    Args:
+        available: full names of the character's controls.
+        prefix: prefix of these names.
+
+    Returns:
+        Control name -> (frame, value) of each keyframe; and the names of the tracks for which
+        the character has no control.
+    """
     out: dict[str, list[tuple[float, float]]] = {}
     missing = []
     blinks = [(1.0, 0.0)]

@@ -137,7 +137,7 @@ def drawn(meshes: dict[str, tuple[Doubles, Faces]]) -> tuple[Doubles, Faces]:
 
 
 def avatar(meshes: dict[str, tuple[Doubles, Faces]]) -> list[dict[str, object]]:
-    """Meshes of triangles for head, eyes and teeth, with the usual names of game avatars."""
+    """Triangle meshes of a head, its eyes and its teeth, named as Ready Player Me names them."""
     head = remeshed(*meshes[HEAD], ("SUBSURF", {"levels": 1}), ("DECIMATE", {"ratio": 0.12}))
     named = {"Wolf3D_Head": head, "EyeLeft": meshes["eyeLeft_lod0_mesh"]}
     named |= {"EyeRight": meshes["eyeRight_lod0_mesh"], "Wolf3D_Teeth": meshes["teeth_lod0_mesh"]}

@@ -41,7 +41,7 @@ _COLOURS = (  # (part of a mesh name, colour factor RGB); other meshes are clay
     ("teeth", (1.2, 1.15, 1.0)), ("tongue", (1.1, 0.6, 0.6)), ("gums", (1.1, 0.55, 0.55)),
     ("eyeleft", (1.3, 1.3, 1.3)), ("eyeright", (1.3, 1.3, 1.3)),
 )  # fmt: skip
-# Parts of the names of meshes that need a texture with alpha, so the sheet leaves them out.
+# A mesh whose name contains one of these words needs a texture with alpha, and is not drawn.
 _CLEAR = ("cornea", "eyeshell", "eyeedge", "cartilage", "saliva", "lash", "hair", "brows")
 
 
@@ -82,10 +82,11 @@ class Face:
         self._frame = self._face()
 
     def _face(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top of a picture, cm.
+        """Left, right, bottom and top of the area that a picture shows, cm.
 
-        The eye meshes determine the frame, because expressions do not move them. A face without
-        two eye meshes uses the mean and the width of all points. Also sets self._depth.
+        The middles of the eye meshes determine this area, because expressions do not move them. A
+        face without two eye meshes uses the mean and the width of all points. Also sets
+        self._depth, z of the vertical axis about which the head is turned.
         """
         eyes = [
             np.asarray(self.dna.meshes[m].positions).mean(axis=0)

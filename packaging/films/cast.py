@@ -21,9 +21,10 @@ import scene as stage  # noqa: E402
 from mathutils import Vector  # noqa: E402
 from performance import must  # noqa: E402
 
-# Distance between faces in metres, to the right and down. Shirts are wider and longer than a cell,
-# so faces would intersect. Lower rows therefore stand nearer to the camera, and every second face
-# of a row stands farther away. The orthographic camera does not show these depths.
+# Width (x) and height (z) of a cell in metres; one face stands in each cell. Shirts are wider and
+# longer than a cell, so neighbours would intersect. Lower rows therefore stand nearer to the
+# camera, and every second face of a row stands farther away. The orthographic camera does not show
+# these depths.
 CELL = Vector((0.38, 0.0, 0.36))
 NEARER, FARTHER = 0.7, 0.35
 RAISED = 0.035  # metres by which the camera is raised, to leave room for hair
@@ -87,7 +88,7 @@ def share_action(controls, first):
 
 
 def build_stage(columns, rows):
-    """Add an orthographic camera and sun lights, because both treat all faces alike.
+    """Add an orthographic camera and sun lights. Both show faces in all places alike.
 
     Args:
         columns: number of columns of faces.

@@ -26,8 +26,8 @@ from mathutils import Vector  # noqa: E402
 
 GROWN = 0.063  # metres between the eyes of an adult head, to which VIEWS refers
 # View -> (origin, target of the camera, place of the camera, focal length in mm). Target and place
-# are in mm from the origin: x to the face's left, y to the back, z up. The origin is the midpoint
-# between the eyes, lowered to the teeth for "teeth".
+# are in mm from the origin: x to the face's left, y to the back, z up. The origin "eyes" is the
+# midpoint between the eyes; "teeth" is the point below it at the height of the teeth.
 VIEWS = {
     "eye": ("eyes", (32, -5, 0), (32, -180, 4), 60),
     "mouth": ("teeth", (0, 0, 0), (0, -200, 8), 70),
@@ -54,7 +54,10 @@ def parse():
 
 
 def middle(collection, part):
-    """World space mean of the bounding box corners of the meshes with `part` in their names."""
+    """The middle of a part of the face in world space.
+
+    It is the mean of the bounding box corners of the meshes with `part` in their names.
+    """
     meshes = [o for o in collection.all_objects if o.type == "MESH" and part in o.name]
     corners = [o.matrix_world @ Vector(corner) for o in meshes for corner in o.bound_box]
     return sum(corners, Vector()) / len(corners)
@@ -108,7 +111,8 @@ def pictures(path, args):
     out = {engine: {} for engine in args.engine}
     for engine in args.engine:
         use_engine(engine)
-        # EEVEE renders cards: it draws strands at least one pixel wide, so brows would look heavy.
+        # Cycles renders hair as strands. EEVEE draws a strand at least one pixel wide, so brows
+        # would look heavy; it renders hair as cards.
         bpy.ops.risorius.set_strands(enable=engine == "cycles" and not args.cards)
         for view in args.view:
             begin = time.monotonic()

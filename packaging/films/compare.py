@@ -26,7 +26,8 @@ import scene as stage  # noqa: E402
 from PIL import Image, ImageDraw, ImageFont  # noqa: E402
 
 LEFT_RIGHT = ("L", "R")
-# Name -> (controls of both sides, without L and R; controls without a side), each with its value.
+# Name of an expression -> (control -> value for controls of both sides, whose names lack L and R
+# here; control -> value for controls without a side).
 EXPRESSIONS = {
     "neutral": ({}, {}),
     "smile": ({"mouthCornerPull": 1, "eyeCheekRaise": 0.6, "eyeSquintInner": 0.4}, {}),
@@ -54,7 +55,8 @@ FOLDS = {
     "grin": ({"mouthCornerPull": 1, "eyeCheekRaise": 1, "eyeSquintInner": 0.6}, {}),
     "chin": ({"jawChinRaiseD": 1, "jawChinRaiseU": 0.5}, {}),
 }
-# (height of the target as a fraction of the face's bounds, focal length as a factor of 100 mm)
+# Close-ups: (height of the camera's target as a fraction of the height of the face's bounds, 0 at
+# the bottom; focal length divided by 100 mm).
 MOUTH, EYES, FACE = (0.54, 2.4), (0.69, 2.8), (0.65, 1.8)
 LOOKS = dict(zip(COMBINED, [(0.57, 1.6), MOUTH, MOUTH, MOUTH, EYES, EYES], strict=True))
 TURNED = {"neck": 16.0, "head": 18.0}  # degrees about the vertical
@@ -96,7 +98,8 @@ def look_at(collection, share, near):
 
     Args:
         collection: collection with the face's meshes.
-        share: height of the target as a fraction of the meshes' bounds, 0 at the lowest point.
+        share: height of the target as a fraction of the height of the meshes, 0 at the lowest
+            point and 1 at the highest.
         near: magnification relative to a focal length of 100 mm.
     """
     low, high = stage.bounds(collection)
@@ -115,7 +118,7 @@ def render_row(path, folder, size, expressions, close):
         folder: folder of the pictures.
         size: width and height of a picture, pixels.
         expressions: controls and values of each expression, as EXPRESSIONS.
-        close: magnify the face (FACE) in expressions that LOOKS does not list.
+        close: show only the face (close-up FACE) in expressions for which LOOKS has no close-up.
     """
     for item in list(bpy.data.objects):
         bpy.data.objects.remove(item)

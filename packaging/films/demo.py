@@ -72,7 +72,7 @@ def turn(bone, degrees):
 
 
 def act(controls):
-    """Insert keyframes: tracks of acting.py on the bone `face`, rotations of BONES on others.
+    """Insert keyframes: the tracks of acting.py on the bone `face`, its BONES on the other bones.
 
     Returns the number of controls that have keyframes.
     """

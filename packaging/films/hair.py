@@ -37,7 +37,10 @@ def chance(tree, low, high, seed):
 
 
 def offset(tree):
-    """Returns an output socket: a random offset of each hair, REACH scaled by SPREAD."""
+    """Returns an output socket: the offset of each point of a hair from its edge.
+
+    Each hair has a random vector within REACH; SPREAD scales it along the hair.
+    """
     place = add(tree, "FunctionNodeRandomValue", data_type="FLOAT_VECTOR")
     place.inputs["Min"].default_value = [-r for r in REACH]
     place.inputs["Max"].default_value = REACH
@@ -58,7 +61,7 @@ def offset(tree):
 
 
 def grow(band, material):
-    """Replace the display of a band by hair along its edges.
+    """Show hair along the edges of a band instead of the band.
 
     Args:
         band: an object whose mesh has the attribute `along` at the edges that hairs follow.

@@ -44,7 +44,7 @@ def go_to(seconds):
 
 
 def add_moods(controls):
-    """Insert keyframes of each mood's expression at the beginning and the end of its time."""
+    """Insert keyframes of each mood's expression at the first and last second of the mood."""
     for begin, end, name, strength, flip in acting.MOODS:
         for seconds in (begin, end):
             go_to(seconds)
@@ -54,7 +54,7 @@ def add_moods(controls):
 
 
 def add_smirk(path):
-    """Drag up a vertex of the mouth's corner, which sets one control, and insert a keyframe."""
+    """Drag the left corner of the mouth up, which moves a single control, and insert a keyframe."""
     go_to(17.4)
     must(bpy.ops.risorius.breakdown(kind="BREAKDOWN", factor=0.5))
     mesh, vertex, way = corner_of_mouth(path)
@@ -63,13 +63,13 @@ def add_smirk(path):
 
 
 def corner_of_mouth(path):
-    """The vertex that mouthCornerPullL moves most.
+    """The vertex that the control mouthCornerPullL moves most.
 
     Args:
         path: the DNA file.
 
-    Returns: mesh index, vertex index, and the displacement in metres with z up; the DNA file has
-        centimetres and y up.
+    Returns: mesh index, vertex index, and the vertex's displacement at 1.0 in metres with z up
+        (converted, because the DNA file has centimetres and y up).
     """
     import risorius
 
@@ -119,7 +119,10 @@ def add_life(controls):
 
 
 def eyes_of(controls):
-    """The point midway between the eyes, and the head's height (4 x distance of the eyes), in m."""
+    """The midpoint of the eyes in world space, and the head's height, in metres.
+
+    The height is estimated as four times the distance between the eyes.
+    """
     rig = next(
         thing
         for thing in controls.users_collection[0].objects

@@ -19,7 +19,8 @@ LINES = [
 
 INTENSITY = 0.75  # of the speech; below 1, because a mood has already moved the mouth
 
-# Moods: (first and last second at full strength, expression, strength, whether mirrored).
+# Moods: (first second, last second, expression, strength, whether the expression is mirrored). The
+# expression has this strength from the first to the last second, and blends into the next mood.
 MOODS = [
     (0.0, 0.6, "relief", 0.15, False),
     (1.4, 4.6, "doubt", 0.7, False),
@@ -33,7 +34,8 @@ SMIRK = 0.45  # fraction of the displacement of the mouth's corner in a full smi
 NEARER = 0.62  # the camera's distance as a fraction of the studio's
 BLINKS = [0.9, 4.9, 6.8, 12.8, 15.2, 17.2]
 
-# Targets of the gaze: (second, (left of, in front of, above the eyes)) in heights of the head.
+# Targets of the gaze: (second, place). A place has the distances to the left of, in front of and
+# above the midpoint of the eyes, in heights of the head.
 LOOKS = [
     (0.0, (1.6, 2.6, 0.1)),
     (1.1, (1.6, 2.6, 0.1)),

@@ -42,7 +42,13 @@ def parse():
 
 
 def turn(controls, bone, angles):
-    """Rotate a control bone by Rz(yaw) Rx(-pitch) Ry(roll) in the face's axes, radians."""
+    """Rotate a control bone from rest by Rz(yaw) Rx(-pitch) Ry(roll) about the armature's axes.
+
+    Args:
+        controls: control armature of the face.
+        bone: name of the bone.
+        angles: (yaw, pitch, roll), radians.
+    """
     yaw, pitch, roll = angles
     matrix = Matrix.Rotation(yaw, 3, "Z") @ Matrix.Rotation(-pitch, 3, "X")
     matrix = matrix @ Matrix.Rotation(roll, 3, "Y")

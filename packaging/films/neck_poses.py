@@ -33,7 +33,8 @@ LIMITS = {
     "tilt left": {"neck": (0.0, 0.0, 0.3), "head": (0.0, 0.0, 0.35)},
     "tilt right": {"neck": (0.0, 0.0, -0.3), "head": (0.0, 0.0, -0.35)},
 }
-# Pose -> height of the ridges of the left muscle, the right muscle and the throat, cm.
+# Pose -> height of the ridges of the left muscle, the right muscle and the throat, cm; negative for
+# a groove.
 MUSCLES = {
     "left": (-0.2, 1.3, 0.2),
     "right": (1.3, -0.2, 0.2),
@@ -47,7 +48,7 @@ WIDTH = 1.3  # width of a muscle, cm
 
 
 def add(source: Path, target: Path) -> None:
-    """Write a file with neck poses.
+    """Write a copy of a DNA file with the neck poses added.
 
     Args:
         source: DNA file of a face with joints neck_01, neck_02 and head, x to the left and y up,
@@ -79,15 +80,15 @@ def add(source: Path, target: Path) -> None:
 
 
 def _add_controls(dna: risorius.Dna, names: list[str], poses: int) -> None:
-    """Append raw controls and renumber all inputs.
+    """Append raw controls and renumber the controls that the rig's tables read.
 
-    Corrective outputs come after the raw controls, so their indices grow by the number of new
-    controls. The outputs of RBF poses come after the correctives.
+    The controls are numbered in this order: raw controls, correctives, RBF poses. So the indices of
+    the correctives grow by the number of new raw controls.
 
     Args:
         dna: the face to change.
         names: names of the new raw controls.
-        poses: number of RBF pose outputs.
+        poses: number of RBF poses that will be added.
     """
     count = len(dna.raw_control_names)
     dna.raw_control_names = [*dna.raw_control_names, *names]
@@ -175,7 +176,11 @@ class _Neck:
         self.mask = self._shared()
 
     def _shared(self) -> np.ndarray:
-        """float64[V], 0 to 1: the degree to which several joints of the neck share a vertex."""
+        """float64[V]: the degree to which several joints of the neck share a vertex.
+
+        0: one joint with all that follows it has the whole weight. 1: no joint has more than 0.6 of
+        the weight. The values are smoothed along the edges of the mesh.
+        """
         parents, chain = self.dna.joint_parents, [0, *self.turns]
         column = []
         for joint in range(len(parents)):
@@ -220,7 +225,8 @@ class _Neck:
         moves = self._matrices(name)
         ends = np.concatenate([self.rest, np.ones((len(self.rest), 1))], axis=1)
         skinned = np.einsum("vrc,vc->vr", moves, ends)
-        # Smoothing removes detail. The detail of the neutral skin is added, turned by the joints.
+        # Smoothing the posed skin removes its detail. So the detail of the neutral skin is turned
+        # by the joints and added.
         detail = self.rest - self._smoothed(self.rest, ROUNDS)
         turned = np.einsum("vrc,vc->vr", moves[:, :, :3], detail)
         smooth = self._smoothed(skinned, ROUNDS) + turned - skinned

@@ -70,7 +70,7 @@ def add_material(name, colour, roughness, sheen=0.0):
 
 
 def ring_faces(rows, columns):
-    """Quads between neighbouring rows of vertices; each row is a closed ring of `columns`."""
+    """Quads between neighbouring rows. Each row is a closed ring of `columns` vertices."""
     at = np.arange(rows * columns).reshape(rows, columns)
     right = np.roll(at, -1, axis=1)
     quads = np.stack([at[:-1], right[:-1], right[1:], at[1:]], axis=-1)
@@ -129,7 +129,7 @@ def collide(thing, thickness):
 
     Args:
         thing: the object.
-        thickness: outer distance that cloth keeps, metres.
+        thickness: distance that cloth keeps from the object's surface, metres.
     """
     thing.modifiers.new("Collision", "COLLISION")
     thing.collision.thickness_outer = thickness
@@ -137,7 +137,7 @@ def collide(thing, thickness):
 
 
 def simulate(thing, mass, bending, first, last):
-    """Add a cloth modifier that collides, and return it.
+    """Make an object cloth that collides with other objects. Returns its cloth modifier.
 
     Args:
         thing: the object.

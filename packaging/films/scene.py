@@ -124,7 +124,7 @@ def meet_eyes():
 
 
 def darken(scene):
-    """Give the scene a dark world, which lights the face hardly at all."""
+    """Give the scene a dark world, which adds almost no light to the face."""
     world = bpy.data.worlds.new("Stage")
     scene.world = world
     world.use_nodes = True
@@ -183,7 +183,7 @@ def _denoise(cycles):
 
 
 def _develop(view):
-    """Choose a view transform with higher contrast, among those that this Blender has."""
+    """Choose a view transform, and a look with more contrast, from those that this Blender has."""
     _choose(view, "view_transform", ("AgX", "Filmic", "Standard"))
     _choose(view, "look", ("AgX - Medium High Contrast", "Medium High Contrast", "None"))
 

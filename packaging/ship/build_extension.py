@@ -85,10 +85,11 @@ def fetch_pinned(folder: Path) -> list[Path]:
 
 
 def people_wheel(wheels: list[Path]) -> Path:
-    """The wheel of the sample people in the folder of the first wheel.
+    """Path of the wheel of the sample people.
 
     Args:
-        wheels: wheels of risorius, all of one version.
+        wheels: wheels of risorius, all of one version; the wheel of the sample people has the same
+            version and is in the folder of the first of them.
 
     Raises:
         SystemExit: the file is missing.

@@ -80,7 +80,10 @@ def seen(points: Doubles, triangles: Ints) -> NDArray[np.bool_]:
 
 
 def nearest_triangles(points: Doubles, triangles: Ints) -> Ints:
-    """Indices of the triangles that a depth buffer along -z shows. Back faces only hide others."""
+    """Indices of the triangles that a view along -z shows.
+
+    A triangle whose back is seen hides others, but is not in the result.
+    """
     corners = points[triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
     low = corners[:, :, :2].reshape(-1, 2).min(axis=0)
@@ -317,9 +320,9 @@ def teeth_told(
     Args:
         mean: float64[V, 3], the mean skin.
         weights: float64[V], weight of each vertex in the fit of a head.
-        skins: float64[V, 3] of each head.
-        teeth: float64[n, 3] of each head, vertices of the strip of its lower teeth.
-        strip: polygons of that strip.
+        skins: float64[V, 3] of each head, the vertices of its skin.
+        teeth: float64[n, 3] of each head, the vertices of its lower row of teeth.
+        strip: polygons of the lower row of teeth.
     """
     chosen = np.flatnonzero(weights >= TEETH_SEEN)[::TEETH_STEP]
     placed, lower = [], []
@@ -392,7 +395,8 @@ def expression(
         root: the point between the eyes, decimetres.
         mean: the mean shape, cm.
         weights: weight of each point in the fit.
-        rows: rows of the kept points, with the eyes' points at the end.
+        rows: for each point of the mean shape, its index among the vertices heads.kept, followed by
+            two points of each eye.
     """
     rest = heads.base.positions[heads.kept]
     # The face units (shapes of expressions) are made for the adult face of the data, but the base
@@ -408,7 +412,7 @@ def expression(
 
 
 def rows_of(rows: Ints, count: int) -> Ints:
-    """The rows of the skin, followed by the rows `count` to `count + 3` of the eyes."""
+    """`rows` with `count` to `count + 3` in place of its last four entries (points of the eyes)."""
     return np.concatenate([rows[:-4], count + np.arange(4)])
 
 

@@ -157,8 +157,8 @@ TEST(ApiFace, HasNoMeshThatWasNotAskedFor) {
   EXPECT_EQ(m.target_count, 0u);
 }
 
-// A compiled program depends on the sizes and offsets of the structs in risorius.h, so that a
-// change of one needs a new RISORIUS_ABI.
+// A compiled program depends on the sizes and offsets of the structs in risorius.h. A change of a
+// size or an offset needs a new number RISORIUS_ABI.
 TEST(ApiFace, TheLibraryIsTheHeaders) {
   EXPECT_EQ(risorius_abi(), std::uint32_t{RISORIUS_ABI});
   EXPECT_STREQ(risorius_version(), RISORIUS_TEST_VERSION);

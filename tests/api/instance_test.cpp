@@ -164,8 +164,8 @@ TEST(ApiInstance, TwoThreadsWithOneEachDoNotMeet) {
                 RISORIUS_OK);
       EXPECT_EQ(risorius_evaluate(instance.get()), RISORIUS_OK);
       out.push_back(values(instance, RISORIUS_JOINTS));
-      // The last error is stored per thread, so that each thread finds in it the LOD that it asked
-      // for itself.
+      // Each thread has its own last error, so the message contains the invalid LOD that this
+      // thread has set, and not the LOD that the other thread has set.
       EXPECT_EQ(risorius_set_lod(instance.get(), static_cast<std::uint32_t>(1000 + first)),
                 RISORIUS_BAD_ARGUMENT);
       EXPECT_NE(std::string(risorius_last_error()->message).find(std::to_string(1000 + first)),

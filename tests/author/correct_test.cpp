@@ -154,8 +154,8 @@ TEST(Correct, WhatTwoPartsDoTogetherIsRepairedNearTheFaultAlone) {
     const auto& x = repair->displacement[v];
     const double length = std::hypot(x[0], x[1], x[2]);
     most = std::max(most, length);
-    // All vertices that are deeper than kDepth in the ball are within 3.2 mm of the middle of the
-    // sheet.
+    // All faults (vertices that are too deep in the ball) are within 3.2 mm of the middle of the
+    // sheet. Only vertices within kAround of a fault may move.
     if (std::hypot(x_of(v), y_of(v)) > 3.5 + SkinChecker::kAround) {
       EXPECT_EQ(length, 0.0) << v;
     }
@@ -266,8 +266,9 @@ TEST(Correct, WhatOnePartDoesByItselfIsNoFault) {
       std::ranges::all_of(repair->displacement, [](const Vector3& x) { return x == Vector3{}; }));
 }
 
-/// One skin of two sheets, 1 mm apart. In: apart  true: the sheets face away from each other, like
-/// a thin plate; false: they face each other
+/// One skin of two sheets, 1 mm apart.
+/// In: apart  true: the sheets face away from each other, like both sides of a thin plate; false:
+///            they face each other
 Scene sheets(bool apart) {
   Scene scene;
   const std::size_t count = scene.skin.neutral.size(), faces = scene.skin.corners.size();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Fits of joints to shapes that were made with known joints.
+// Tests fits of joints to shapes that were made with known joints.
 #include "author/fit.h"
 
 #include <gtest/gtest.h>
@@ -252,8 +252,9 @@ TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
     options.bound = true;
     auto best = fit_joints(shapes, options);
     ASSERT_TRUE(last && best);
-    // The best round may have a slightly larger error here than the last one: the fit compares
-    // rounds over four expressions, because it adds the mirror of the third one.
+    // The result of the best round may have a slightly larger error here than the result of the
+    // last round. The fit compares its rounds over four expressions (it adds the mirror image of
+    // the third expression), but largest_error() has only three.
     EXPECT_LE(largest_error(shapes, *best), 1.1 * largest_error(shapes, *last)) << rounds;
     any = any || largest_error(shapes, *best) < 0.9 * largest_error(shapes, *last);
   }
@@ -310,8 +311,8 @@ TEST(Fit, WhatIsMoreImportantComesNearer) {
     Shapes left = shapes;
     for (std::size_t v = 0; v < left.vertex_count(); ++v) {
       if (left.neutral[v][0] > 0.0) continue;
-      // Vertices of the right side get no displacement and no weight on moving joints, so that
-      // their error is 0.
+      // Only errors of the left side count. So the vertices of the right side get no displacement,
+      // and weights only on a joint that does not move.
       for (std::size_t e = 0; e < left.expressions; ++e) {
         for (std::size_t k = 0; k < 3; ++k) at(left, v, e, k) = 0.0f;
       }

@@ -10,9 +10,9 @@ namespace {
 
 constexpr std::uint32_t kNone = Mirror::kNone;
 
-/// Two triangles that share the vertices 0 and 2 in the middle; vertex 1 is on the left, vertex 3
-/// on the right. The vertices are not in the order of their heights, because the search sorts them
-/// by height.
+/// Two triangles that share the vertices 0 and 2 in the middle. Vertex 1 is on the left, vertex 3
+/// on the right. The vertices are not in the order of their heights, so that a missing sort by
+/// height in find_mirror() would give wrong pairs.
 Shapes kite(std::size_t expressions) {
   Shapes out;
   out.neutral = {{0, 2, 0}, {1, 1, 0.5}, {0, 0, 0}, {-1, 1, 0.5}};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Rows of mesh buffers survive packing by EXT_meshopt_compression, and bytes that are cut or too
-// few are errors.
+// Tests that rows of mesh buffers survive packing by EXT_meshopt_compression, and that packed bytes
+// that are cut or too few are refused.
 #include "author/packed.h"
 
 #include <gtest/gtest.h>

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t kCorners = 17;
 
-/// A flat sheet of 17 x 17 corners with sides of length 1.
+/// A flat square sheet of 17 x 17 vertices, whose sides have length 1.
 Surface square() {
   Surface out;
   for (std::uint32_t y = 0; y < kCorners; ++y) {

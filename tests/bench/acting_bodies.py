@@ -137,8 +137,8 @@ class Arch:
 
         Args:
             places: [V, 3], neutral.
-            triangles: [F, 3] of one row.
-            back: z of the axis.
+            triangles: [F, 3] of one row of teeth, upper or lower.
+            back: z of the vertical axis; its x is 0.
         """
         self.back = back
         points = _dense(places, triangles, self._FINE)
@@ -183,17 +183,17 @@ def _dense(places: Floats, triangles: Ints, fine: int) -> Floats:
 
 
 class Cards:
-    """Vertices of hair, each assigned to a triangle at the nearest vertex of the neutral skin."""
+    """Vertices of hair, each with the skin triangles that are near it in the neutral pose."""
 
-    # The nearest triangle in another pose is searched among the triangles that are near a hair in
-    # the neutral pose: among the NEAR nearest, and in deep folds among the AROUND nearest.
+    # In a pose, the triangle nearest to a hair vertex is searched among the triangles that are
+    # nearest to this vertex in the neutral pose: the first NEAR of them, or in deep folds AROUND.
     NEAR, AROUND = 48, 400
 
     def __init__(self, hairs: Floats, places: Floats, triangles: Ints) -> None:
-        """Find the triangles.
+        """Find the triangles near each hair vertex in the neutral pose.
 
         Args:
-            hairs: [n, 3], neutral.
+            hairs: [n, 3], neutral vertices of hair.
             places: [V, 3] of the neutral skin.
             triangles: [F, 3] of the skin.
         """
@@ -247,7 +247,7 @@ def _away(points: Floats, others: Floats) -> Floats:
 
 
 def _nearest_in(u: Floats, v: Floats, way: Floats) -> Floats:
-    """The point of the triangles (0, u, v), each [..., 3], that is nearest to `way`."""
+    """The point nearest to `way` in each triangle with the corners 0, u and v; all are [..., 3]."""
 
     def dot(p: Floats, q: Floats) -> Floats:
         return np.einsum("...d,...d->...", p, q)[..., None]

@@ -33,13 +33,21 @@ _ROOT = 0.5  # mm; hair vertices nearer to the skin in the neutral pose are root
 
 
 class Points:
-    """The vertices that the checks need in each frame; each is computed once for all checks."""
+    """The vertices that the checks need in each frame. A vertex is computed once for all checks."""
 
     def __init__(self, surface: Any) -> None:
         self._surface, self._rows, self._where = surface, [], {}
 
     def add(self, mesh: int, vertices: Ints) -> Ints:
-        """Register vertices of a mesh, an array of any shape. Returns their rows in at()."""
+        """Register vertices of a mesh.
+
+        Args:
+            mesh: index of the mesh.
+            vertices: vertex indices, an array of any shape.
+
+        Returns:
+            For each vertex its row in the result of at(), in an array of the same shape.
+        """
         unique, inverse = np.unique(vertices, return_inverse=True)
         place = []
         for vertex in unique:
@@ -115,7 +123,7 @@ class Mouth:
 
     @staticmethod
     def _lips(skin: bodies.Skin, teeth: Floats, back: float, wide: float) -> bodies.Skin:
-        """The skin samples in front of the teeth that face outwards, in the neutral pose."""
+        """The outward facing skin samples in front of the teeth, in the neutral pose."""
         ray = skin.places * [1.0, 0.0, 1.0] - [0.0, 0.0, back]
         radius = np.linalg.norm(ray, axis=1).clip(1e-9)
         outward = np.einsum("nd,nd->n", ray / radius[:, None], skin.normals) > 0.0
@@ -213,9 +221,10 @@ class Face:
         return next(m for n, m in self._meshes.items() if n.startswith(name))
 
     def corneas(self, side: float) -> list[Floats]:
-        """Vertices of each mesh named cornea on one side; empty if the face has no such mesh.
+        """Neutral vertices on one side of the face, for each mesh whose name begins with cornea.
 
-        side: a number with the sign of x on the side.
+        Args:
+            side: any number with the sign that x has on this side.
         """
         found = [self.rest[m] for n, m in self._meshes.items() if n.startswith("cornea")]
         return [places[places[:, 0] * side > 0] for places in found]
@@ -240,9 +249,9 @@ class Face:
 
 
 def measure(face: Face, acting: Acting) -> dict[str, npt.NDArray[np.float64]]:
-    """Check -> float64[frames, 4]: largest depth of each frame in mm, and where it is.
+    """Name of a check -> float64[frames, 4]: the largest depth in each frame, and its place.
 
-    The place (x, y, z) is in the unit of the DNA file.
+    The depth is in mm; the place (x, y, z) is in the unit of the DNA file.
     """
     checks = {name: np.zeros((len(acting.raw), 4)) for name in LIMITS}
     for frame, raw in enumerate(acting.raw):
@@ -261,6 +270,8 @@ def report(
     """The results of the checks as rows, with the worst frames of each.
 
     Args:
+        face: the person.
+        acting: the frames.
         checks: result of measure().
         worst: number of frames to list for each check.
     """

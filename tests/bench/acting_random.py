@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes frames of random acting from a seed, both usual and unusual ones.
+"""Makes frames of random acting from a seed. Some are usual, others unusual.
 
 A third of the frames are one or two expressions. A third are speech (of a clip, or blended visemes)
 under an expression. A third are two random controls. Half of all frames get a gaze, and a third get

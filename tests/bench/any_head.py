@@ -155,7 +155,7 @@ class Identities:
 
 
 def places(source: Source, laid: Laid, true: np.ndarray) -> list[float]:
-    """The errors of a registration: the columns surface, along and corner."""
+    """The values of the table columns surface, along and corner: errors of a registration in mm."""
     on = laid.registered.trusted
     along = MM * any_heads.errors(source.face.surface, laid.points, true)
     corner = MM * np.linalg.norm(laid.points - true, axis=1)[source.corners].max()
@@ -163,7 +163,7 @@ def places(source: Source, laid: Laid, true: np.ndarray) -> list[float]:
 
 
 def expressions(source: Source, true: TemplateFace, target: Surface, laid: Laid) -> list[float]:
-    """The errors of the expressions before repair: the columns rows, worst mean, worst 95 %."""
+    """The table columns rows, worst mean, worst 95 %: errors of the expressions before repair."""
     options = TransferOptions()
     carried = transfer(source.face, target, laid.points, laid.trust, options, None, laid.jaw)
     on, ways = truth.truth_on(true, target)
@@ -173,7 +173,10 @@ def expressions(source: Source, true: TemplateFace, target: Surface, laid: Laid)
 
 
 def contacts(template, source: Source, target: Surface) -> list[float]:
-    """The contacts after repair, as `risorius author --onto` makes them: columns gap, cut, lips."""
+    """The values of the table columns gap, cut and lips in mm.
+
+    They are measured on the expressions that `risorius author --onto` makes, which are repaired.
+    """
     faces = target.triangles.tolist()
     mesh = ObjMesh(target.points, np.zeros((0, 2)), faces, [[] for _ in faces])
     part = HeadPart("head", mesh, source="head")
@@ -183,7 +186,7 @@ def contacts(template, source: Source, target: Surface) -> list[float]:
 
 
 def told(name: str, values: list[float], seconds: float) -> bool:
-    """Print the row of a head. Returns whether the head reaches all targets."""
+    """Print the row of a head. Returns whether its values in all columns are within LIMITS."""
     missed, cells = [], []
     for column, value, limit in zip(COLUMNS, values, LIMITS, strict=False):
         share = column == "rows"

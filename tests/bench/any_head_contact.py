@@ -79,12 +79,12 @@ def row_of(target, fitted, singles, pairs, work, contacts, bodies, most):
 
     Args:
         target: the head's skin.
-        fitted: its Fittings.
+        fitted: eyes, teeth and other parts fitted to the head.
         singles: control -> displacements float64[V, 3], cm.
         pairs: tuple of controls -> displacements of their corrective.
         work: Repairing that finds the faults of a pose.
         contacts: Contacts that measures the volume of skin in teeth.
-        bodies: not read.
+        bodies: unused.
         most: number of poses whose volume is summed.
     """
     poses = {(name,): way for name, way in singles.items()} | pairs

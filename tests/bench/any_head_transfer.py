@@ -53,7 +53,16 @@ def skin_of(person, source) -> TemplateFace:
 
 
 def truth_on(face: TemplateFace, target: Surface) -> tuple[np.ndarray, dict]:
-    """bool[V]: whether a target vertex is on the true skin; pose -> true displacements [V, 3]."""
+    """The true displacements of a remeshed head.
+
+    Args:
+        face: the person's skin, whose displacements are known.
+        target: the remeshed skin of the same person.
+
+    Returns:
+        bool[V]: whether a vertex of the target has a place on the person's skin; and pose ->
+        float64[V, 3], the displacements of this place in cm.
+    """
     own = face.surface
     near = ClosestPoints(own.points, own.triangles)
     triangle, shares, _ = near.nearest(target.points, target.normals(), 0.5, 0.1)
@@ -64,7 +73,7 @@ def truth_on(face: TemplateFace, target: Surface) -> tuple[np.ndarray, dict]:
 
 
 def by_vertex(face: TemplateFace, target: Surface, laid: Laid) -> dict:
-    """Pose -> displacements [V, 3], copied from the nearest place of the registered template."""
+    """Pose -> displacements [V, 3] that the nearest place of the registered template has, in cm."""
     near = ClosestPoints(laid.points, face.surface.triangles)
     triangle, shares, _ = near.nearest(target.points, target.normals(), 0.4, 1.5)
     corners = face.surface.triangles[np.maximum(triangle, 0)]

@@ -52,11 +52,11 @@ def corners_of(mesh):
 
 
 def undone(search, on, mesh):
-    """Four numbers of moving vertices without a fault, in a pair with its corrective.
+    """Four counts of vertices that a pair of controls moves, and that have no fault.
 
-    They are: all such vertices; vertices whose motion the corrective reduces to less than the
-    fraction KEPT; of these, the ones more than REACH_MM away from any fault; and vertices that the
-    corrective moves by more than 0.01 mm.
+    They are: all such vertices; the vertices that keep less than 0.9 of their motion with the
+    corrective of the pair; of these, the vertices more than 10 mm away from any fault; and the
+    vertices that the corrective moves by more than 0.01 mm.
 
     Args:
         search: the search, after it has repaired the pair.
@@ -98,7 +98,7 @@ def worse(search, on):
 
 
 def grew(a, b):
-    """Whether `b` exceeds `a` by 0.1 mm in greatest depth, or by 1 % in largest stretch.
+    """Whether the greatest depth of `b` is more than 0.1 mm, or its largest stretch 1 %, above `a`.
 
     A stretch of at most TORN, 2.5 times the area of a polygon, does not count.
 
@@ -112,7 +112,9 @@ def grew(a, b):
 
 
 def held_out(dna):
-    """Lines of text: the distances between the face's own pair correctives and the found ones.
+    """Lines of text: the distances between the face's own correctives and found correctives.
+
+    The correctives of pairs are compared; all own correctives are removed before the search.
 
     Args:
         dna: a face with correctives.

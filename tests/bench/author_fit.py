@@ -60,7 +60,10 @@ def head(path, macros=()):
 
 
 def ict(path):
-    """(positions, displacements, polygons) of ICT FaceKit's head with mouth, teeth and eyes."""
+    """(positions [V, 3], displacements [E, V, 3], polygons) of ICT FaceKit's head.
+
+    The head includes mouth, teeth and eyes. Lengths are in the unit of the file.
+    """
     with np.load(path) as data:
         neutral, begin = data["neutral"].astype(float), data["expression_begin"]
         moved = np.zeros((len(begin) - 1, *neutral.shape))

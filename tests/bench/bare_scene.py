@@ -10,7 +10,10 @@ CHANNELS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
 
 
 class Bare:
-    """Replays poses that the add-on has computed: vertices, or (LIVE) bones and shape keys."""
+    """Replays poses that the add-on has computed.
+
+    A pose consists of vertex positions, or in the add-on's shape mode Live of bones and shape keys.
+    """
 
     def __init__(self, rigs):
         # Names instead of objects, because an undo replaces all objects.
@@ -38,7 +41,7 @@ class Bare:
         self.poses.append(pose)
 
     def begin(self):
-        """Disable Armature modifiers of meshes with final vertex positions, as the add-on does."""
+        """Disable Armature modifiers of meshes that get final positions, as the add-on does."""
         self._switch(False)
 
     def end(self):

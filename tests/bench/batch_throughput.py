@@ -95,7 +95,7 @@ def single(clip: risorius.Clip, face: Face, lod: int) -> Clock:
 
 
 def in_chunks(clip: risorius.Clip, face: Face, lod: int) -> Clock:
-    """Time of evaluate_batch on one core without keeping the poses."""
+    """Time to evaluate the clip in chunks of frames on one core. The poses are not kept."""
     with Clock() as clock:
         for _ in played(clip, face, lod):
             pass
@@ -132,7 +132,11 @@ def batches(table: Table, dna: Path, lod: int, folder: Path) -> None:
 
 
 def shares(summary: Path) -> str:
-    """Percentages, as text, of the jobs' time for reading, evaluating and everything else."""
+    """Text with the percentages of the jobs' time that reading, evaluating and the rest take.
+
+    Args:
+        summary: path of summary.json, which the batch has written.
+    """
     rows = json.loads(summary.read_text())["jobs"]
     total = sum(row["job_seconds"] for row in rows)
     load = sum(row["load_seconds"] for row in rows) / total

@@ -3,10 +3,11 @@
 
     python tests/bench/board_expressions.py man.dna
 
-The handles are set as by a click on the expression (least squares over the raw controls). For each
-expression it prints *way*, the distance of the expression from neutral, *off*, the distance of the
-board's pose from the expression, and the number of used handles. Distances are root mean squares in
-mm over the vertices that the expression moves by 0.1 mm, on the mesh with the largest error.
+The primary board is the face board with few handles. Its handles are set as by a click on the
+expression in the add-on (least squares over the raw controls). For each expression it prints *way*,
+the distance of the expression from neutral, *off*, the distance of the board's pose from the
+expression, and the number of used handles. Distances are root mean squares in mm over the vertices
+that the expression moves by 0.1 mm, on the mesh with the largest error.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ def _segment(kind: int, at: Curves, values: Curves, i: int, time: Curves) -> Cur
 
 
 def _bezier_parameter(x: npt.NDArray[np.float64], a: float) -> npt.NDArray[np.float64]:
-    """The Bezier parameter at times x in 0..1, for handles at times a and 1 - a."""
+    """The parameter of a Bezier segment at times x in 0..1, with handles at times a and 1 - a."""
     t = x.copy()
     b = 1.0 - a
     for _ in range(40):

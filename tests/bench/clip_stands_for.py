@@ -20,7 +20,7 @@ from clip_curves import KINDS, RATE, Curves
 
 
 def values_of(rig: risorius.Rig, raw: Curves) -> tuple[int, int]:
-    """The number of the face's values per frame: all, and those that change in the clip."""
+    """The number of the face's values per frame, and the number of them that change in the clip."""
     poses = rig.evaluate_batch(raw)
     moving = count = 0
     for part in (poses.joints, poses.blend_shapes, poses.animated_maps):

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Clocks that the benchmark library lacks.
+// Measures durations by clocks that the benchmark library lacks.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -20,7 +20,8 @@ double wall_seconds_of(F f) {
 }
 
 /// The processor time in seconds that this process takes during f, summed over its threads. Time
-/// that the system gave to other processes does not count. Without such a clock: the wall time.
+/// that the system gave to other processes does not count. On a system without a clock of processor
+/// time, the wall time of f.
 template <class F>
 double own_seconds_of(F f) {
 #ifdef CLOCK_PROCESS_CPUTIME_ID

@@ -23,7 +23,7 @@ class Baseline {
  public:
   Baseline(const dna::Dna& dna, std::uint32_t lod);
   /// Evaluates the raw controls of one frame: correctives, joint groups, channels and maps.
-  /// Networks, solvers and setups are left out.
+  /// Neural networks, RBF solvers, and swing and twist setups are left out.
   void evaluate(const float* raw);
   const Csr& matrix() const { return matrix_; }
   const std::vector<float>& joints() const { return joints_; }

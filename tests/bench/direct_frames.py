@@ -35,7 +35,7 @@ def worlds(dna: risorius.Dna) -> np.ndarray:
 
 
 class Maker:
-    """Makes faces of a file; they share the rig, the bone space and the meshes."""
+    """Makes faces of one DNA file. All these faces share the rig, the bone space and the meshes."""
 
     def __init__(self, dna: risorius.Dna) -> None:
         self.rig = risorius.Rig(dna)
@@ -61,7 +61,7 @@ class Maker:
             self.meshes.append((risorius.Morph(dna, number), mesh.positions, skin))
 
     def face(self) -> tuple[risorius.DirectFace, dict[int, np.ndarray]]:
-        """A face, and mesh -> array for its vertices."""
+        """A face, and index of a mesh -> array to which the mesh's vertices are written."""
         face = risorius.DirectFace(self.rig, self.space, self.chain, self.rows, self.meshes)
         return face, {i: np.empty(m[1].shape, np.float32) for i, m in enumerate(self.meshes)}
 

@@ -11,7 +11,8 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.patches import Rectangle
 
-# Two joint groups: number of rows, number of rows in the coarse LOD, control of each column.
+# Two joint groups: (number of rows, number of rows that the coarse LOD uses, for each column the
+# index of its control in CONTROLS).
 GROUPS = [(7, 3, [0, 1, 3, 4]), (5, 2, [1, 2, 4])]
 CONTROLS = ["jawOpen", "smileL", "blinkL", "smileL x jawOpen", "browUp"]
 ACTIVE = {1, 3}

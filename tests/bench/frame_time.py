@@ -124,7 +124,7 @@ def play(controls, clip, frames, active):
 
 
 def step(frames):
-    """Times in ms of frames 2 to `frames`, in ROUNDS passes."""
+    """The time in ms of each frame from 2 to `frames`; all are played ROUNDS (3) times."""
     scene = bpy.context.scene
     for frame in (1, 2, 3):
         scene.frame_set(frame)
@@ -138,7 +138,10 @@ def step(frames):
 
 
 def own_time(package, frames):
-    """Stage of the add-on's work on a frame -> median ms over all frames, as its overlay shows."""
+    """The add-on's own time on a frame, in the stages that its overlay shows.
+
+    Returns: stage -> median of the frames 2 to `frames` in ms.
+    """
     timing = sys.modules[f"{package}.scene.frame.timing"]
     stages = []
     for frame in range(2, frames + 1):
@@ -200,7 +203,7 @@ def plain_way(controls, rig, path, loops):
 
 
 def floor(package, rig, frames):
-    """Times in ms of frames, with a handler that writes recorded poses and the add-on disabled."""
+    """Times in ms of frames, if the add-on is disabled and a handler writes two recorded poses."""
     bare = bare_scene.Bare([rig])
     for frame in (frames // 3, frames // 2):
         bpy.context.scene.frame_set(frame)
@@ -214,7 +217,16 @@ def floor(package, rig, frames):
 
 
 def row(way, times, note, base=None):
-    """Print a row: median and minimum in ms, fps, and base / median. Returns the median in ms."""
+    """Print a row of the table: median and minimum in ms, fps, base / median, and the note.
+
+    Args:
+        way: name of the row.
+        times: times of frames in ms.
+        note: text in the last column.
+        base: median time of the plain way in ms; None: the ratio is left out.
+
+    Returns: the median in ms.
+    """
     middle = statistics.median(times)
     ratio = f"{base / middle:.1f}" if base else ""
     print(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames of raw controls for benchmarks, generated or read from a file.
+// Makes frames of raw controls for benchmarks: generates them, or reads them from a file.
 #pragma once
 
 #include <algorithm>

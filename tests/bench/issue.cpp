@@ -42,7 +42,8 @@ const Data& data() {
   return made;
 }
 
-// The matrix of bone number i % 4 of the four bone indices that `four` has as 16-bit fields.
+// The matrix of a bone. Its index is one of the four 16-bit fields of `four`: the field i % 4, of
+// which 0 is the lowest.
 const float* row(const Data& d, std::uint64_t four, std::size_t i) {
   return d.rows + std::size_t{static_cast<std::uint16_t>(four >> (16 * (i % 4)))} * kRow;
 }

@@ -9,7 +9,7 @@ times a second, as Blender does between its events. Prints medians and 99th perc
     received   from sending to the receiver's newest frame
     written    from sending to the slider; the wait for the timer is most of it
     timer      the timer function itself
-    shown      the update of the scene after it, without drawing
+    shown      the update of the scene after the timer function, without drawing
 """
 
 import argparse
@@ -63,8 +63,12 @@ def _prepare(dna):
 
 
 def _measure(rig, options):
-    """Frame number -> time of sending; frame number -> times of arrival and of writing the sliders;
-    durations of the timer function; durations of the scene's update. All in seconds."""
+    """Send packets to the add-on, and measure the times of each frame, in seconds.
+
+    Returns:
+        Frame number -> time of sending; frame number -> (time of arrival, time when the sliders
+        were written); the durations of the timer function; the durations of the scene's update.
+    """
     import bpy
     from support import scene
 

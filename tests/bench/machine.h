@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The machine and the build of a benchmark.
+// Describes the machine on which a benchmark runs, and the benchmark's build.
 #pragma once
 
 #include <fstream>

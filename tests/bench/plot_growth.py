@@ -25,10 +25,10 @@ Point = tuple[float, float, float | None, float | None]
 
 
 def read(path: Path) -> tuple[str, dict[str, list[Point]]]:
-    """The title in the first line, and panel -> sorted points.
+    """The title in the first line of the file, and panel -> points sorted by x.
 
-    A point is x, then the microseconds of Risorius, of a CSR matrix, and of just reading the active
-    columns. The last two are None where they were not measured.
+    A point is x, then the microseconds of Risorius, of a CSR matrix, and of only reading the active
+    columns. The last two are None if they were not measured.
     """
     lines = path.read_text(encoding="utf-8").splitlines()
     points: dict[str, list[Point]] = {name: [] for name in PANELS}

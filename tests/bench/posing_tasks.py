@@ -92,8 +92,16 @@ TASKS: dict[str, dict[str, float]] = {
 
 @dataclass
 class Done:
-    """The cost of a pose: events of the mouse button (openings: those that opened a region), events
-    of keys, the pointer's path in pixels and its position, and the remaining error in mm."""
+    """The cost of a pose.
+
+    Attributes:
+        events: number of presses and releases of the mouse button.
+        keys: number of key events.
+        openings: how many of `events` opened a region of sliders.
+        pixels: length of the pointer's path.
+        error: remaining error in mm.
+        at: place of the pointer in pixels.
+    """
 
     events: int = 0
     keys: int = 0
@@ -246,7 +254,14 @@ def by_board(table, board, unit, away, goal):
 
 
 def by_drags(face, goal, moving, most):
-    """(cost, raw controls) of at most `most` skin drags; each is the drag with the best result."""
+    """(cost, raw controls) of setting a pose by skin drags; each is the drag with the best result.
+
+    Args:
+        face: the face.
+        goal: float64[R], raw controls of the pose.
+        moving: bool[V], vertices that the pose moves by more than 0.1 mm.
+        most: largest number of drags.
+    """
     done, raw = Done(), np.zeros_like(goal)
     wanted = face.at(goal)
     mirrored = is_mirrored(face, goal)
@@ -269,10 +284,11 @@ def is_mirrored(face, goal):
 
 
 def best_drag(face, raw, wanted, moving, mirrored):
-    """(error in mm, raw controls, start, target, key events) of the best drag.
+    """(error in mm, raw controls, start, target, key events) of the drag that leaves the least
+    error.
 
-    Start and target are places of the dragged vertex. None if no moving vertex that is shown is
-    away from its target.
+    Start and target are places of the dragged vertex. Returns None if every visible vertex that the
+    pose moves is already at its target.
     """
     here = face.at(raw)
     off = np.linalg.norm((wanted - here) @ face.screen.T, axis=1) * (moving & face.shown)

@@ -242,7 +242,7 @@ class Suite {
   }
 
  private:
-  // Adds a row of the table. Out: the row's name
+  // Adds a row of the table. Returns the row's name.
   const std::string& row(const std::string& name, const std::string& base = "",
                          const std::string& asked = "", const std::string& read = "",
                          double bytes = 0) {
@@ -400,8 +400,8 @@ class Sweep {
   std::vector<std::unique_ptr<dna::Dna>> smaller_;
 };
 
-// Stores the median of each benchmark. In: progress  show the running benchmark on one line of the
-// terminal
+// Stores the median of each benchmark.
+// In: progress  whether the name of the running benchmark is shown on one line of the terminal
 class Reporter : public benchmark::ConsoleReporter {
  public:
   explicit Reporter(bool progress) : progress_(progress) {}
@@ -442,8 +442,8 @@ const char* missing_part(const dna::Dna& dna) {
   return std::ranges::any_of(dna.behavior.joint_groups, has_values) ? nullptr : "joint groups";
 }
 
-// Adds one set of frames, read from a file or generated. Out: false, after a message, if the file
-// is not valid
+// Adds one set of frames to `out`, read from a file, or generated if `file` is nullptr. Prints a
+// message and returns false if the file is not valid.
 bool add_frames(const std::string& name, std::size_t raw, std::size_t active, const char* file,
                 std::vector<Frames>& out) {
   Frames frames = file != nullptr ? bench::read_frames(file, raw) : bench::make_frames(raw, active);
@@ -463,8 +463,8 @@ bool add_frames(const std::string& name, std::size_t raw, std::size_t active, co
 bool list_frames(std::size_t raw, char** files, const char* clip, std::vector<Frames>& out) {
   // 60 and 100 are first, because in captured animations 60 to 100 raw controls move.
   for (const std::size_t active : {60u, 100u, 20u, 1u, 5u, 140u, 190u}) {
-    // Sets with at least as many active controls as the face has are left out, except 20 and 60,
-    // which files may give; other rows are compared with 60.
+    // A set that needs at least as many controls as the face has is left out. The sets 20 and 60
+    // are kept, because files may give their frames and other rows are compared with 60.
     if (active >= raw && active != 20 && active != 60) continue;
     const char* file = files == nullptr ? nullptr
                        : active == 20   ? files[0]

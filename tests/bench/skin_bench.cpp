@@ -27,7 +27,8 @@ struct Times {
 };
 
 // Measures each step `rounds` times, in turn with the others, so that other load of the machine
-// affects all steps alike. Out: median and least time of each step, in us
+// affects all steps alike.
+// Out: median and least time of each step, in us
 std::vector<Times> measure(const std::vector<std::function<void()>>& steps, std::size_t rounds) {
   std::vector<std::vector<double>> all(steps.size());
   for (std::size_t r = 0; r < rounds; ++r) {
@@ -50,8 +51,9 @@ struct Problem {
   core::AlignedVector<float> rows;
 };
 
-// A mesh with random weights. In: spread  number of neighbouring bones from which a vertex's bones
-// are chosen; kBones: all bones
+// A mesh with random weights.
+// In: spread  number of neighbouring bones from which the bones of a vertex are chosen; kBones: the
+//             bones are chosen from all bones
 Problem make_problem(std::uint32_t spread) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> any(0.01f, 1.0f);

@@ -27,7 +27,7 @@ from risorius.speech.phones import VISEMES, viseme_of
 
 STEP = 0.01  # seconds per frame
 
-# espeak-ng voice, words per minute, pitch from 0 to 100
+# (espeak-ng voice, words per minute, pitch from 0 to 100) of each voice
 TUNED_VOICES = (("en-us", 175, 50), ("en-us+f2", 150, 60), ("en-us+m3", 195, 40))
 HELD_OUT_VOICES = (("en-us+m7", 165, 45), ("en-us+f4", 180, 55), ("en-us+m1", 145, 35))
 TUNED = (
@@ -67,7 +67,11 @@ HELD_OUT = (
 
 
 def corpus(half: str) -> list[tuple[str, str, int, int]]:
-    """(text, voice, words per minute, pitch) of the sentences of a half; voices alternate."""
+    """(text, voice, words per minute, pitch) of each sentence of a half; the voices take turns.
+
+    Args:
+        half: "tuned" or "held-out".
+    """
     texts, voices = (TUNED, TUNED_VOICES) if half == "tuned" else (HELD_OUT, HELD_OUT_VOICES)
     return [(text, *voices[i % len(voices)]) for i, text in enumerate(texts)]
 
@@ -108,7 +112,10 @@ def commonest(table: np.ndarray) -> tuple[str, float]:
 
 
 def markdown(table: np.ndarray) -> str:
-    """Markdown table: row true class, column found class, percent of the row's frames, count."""
+    """A Markdown table with a row for each true class and a column for each found class.
+
+    A cell is the percentage of the row's frames; the last column is their number.
+    """
     lines = [f"| true | {' | '.join(VISEMES)} | frames |", "|---" * (len(VISEMES) + 2) + "|"]
     for name, row in zip(VISEMES, table, strict=True):
         share = [f"{100 * n / max(row.sum(), 1):.0f}" if n else "" for n in row]

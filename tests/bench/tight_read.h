@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The least work of an evaluation: reading the columns of the active controls.
+// Reads only the columns of the active controls, which is the least work of any evaluation.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +36,8 @@ struct Reads {
     return std::span(lines).subspan(begins[frame], begins[frame + 1] - begins[frame]);
   }
 };
-/// Lists the cache lines that each frame needs. In: lod  below the number of LODs
+/// Lists the cache lines that each frame needs.
+/// In: lod  below the number of LODs
 Reads reads_of(const rig::Rig& rig, const Frames& frames, std::uint32_t lod);
 
 /// The values of the Rig's matrices, float32 or float16.

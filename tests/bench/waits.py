@@ -43,7 +43,9 @@ def median_ms(action, rounds, before=None):
 
 
 def in_turn(package, ours, floor, times=3):
-    """[medians of ours, medians of floor], called alternately with the add-on on and off.
+    """[medians of ours, medians of floor]. They are called in turn.
+
+    ours() is called while the add-on is enabled, floor() while it is disabled.
 
     Args:
         package: module name of the add-on.
@@ -152,7 +154,12 @@ def measure_slider(path, package, rounds, mode):
 
 
 def measure_undo(drag, steps=8):
-    """Median ms of steps - 1 undos and of steps - 1 redos, with the scene's evaluation."""
+    """Median time in ms of an undo and of a redo, each with the evaluation of the scene.
+
+    Args:
+        drag: function that makes the change that is undone.
+        steps: number of changes; steps - 1 of them are undone, then redone.
+    """
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="start")
     for step in range(steps):
@@ -194,7 +201,7 @@ def measure_switches(path, package, rounds, mode):
 
 
 def measure_files(path, package, rounds, mode, count=10):
-    """Measure the import, and saving and opening a .blend with several faces."""
+    """Measure the import of a face, and saving and opening a .blend with `count` faces."""
     frame_time.empty_scene(package)
     seconds = []
     for _ in range(rounds):

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The checked reader gives the same from memory and through the window of a file, even if the
-// window cuts a number, and only zeros after a failure.
+// ByteReader gives the same values from bytes in memory and from a file, of which it reads one
+// window at a time, even if a window ends within a number. After a failure it gives only zeros.
 #include "bytes/byte_reader.h"
 
 #include <gtest/gtest.h>

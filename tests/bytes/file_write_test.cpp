@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file is complete or unchanged, whichever system call fails.
+// If a system call fails while a file is written, the file is complete or unchanged afterwards.
 #include "bytes/file_write.h"
 
 #include <gtest/gtest.h>
@@ -125,8 +125,8 @@ TEST_F(FileWrite, OfNoFileFromBeforeAndOfAFolderThatIsNotThereItSaysSo) {
   EXPECT_EQ(folder.error().message, "cannot write " + folder_.string() + ": Is a directory");
 }
 
-// Windows gives the same error for a missing folder and for a file in its place. The message must
-// tell them apart.
+// Windows gives the same error if a folder is missing and if a file has the folder's name. The
+// messages of these cases must differ.
 TEST_F(FileWrite, AFileInPlaceOfTheFolderIsToldFromNoFolderWhateverTheSystemSays) {
   std::ofstream(folder_ / "file") << "x";
   failing = 'o', reason = ENOENT;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Whole .rzc files: writing and reading is lossless, also of some frames and controls; cut, damaged
-// and too large files are refused.
+// Tests whole .rzc files: writing and reading is lossless, also if only some frames and controls
+// are read. Files that are cut, damaged or too large are refused.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -128,7 +128,7 @@ TEST(ClipFile, PairsOfMetadataAreLimited) {
 }
 
 // Each name repeats the previous one and adds a letter, which takes only 3 bytes of the file.
-// Together the names exceed the limit.
+// The names together have 4.5 MB, more than the limit of 1 MB.
 TEST(ClipFile, NamesThatGrowOutOfFewBytesAreLimited) {
   Clip clip;
   std::string name;

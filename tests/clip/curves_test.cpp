@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The curves of a block are lossless and small.
+// Tests that the encoding of the curves of a block is lossless, and that smooth curves become
+// small.
 #include <gtest/gtest.h>
 
 #include <cfenv>

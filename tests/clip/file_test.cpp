@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recording a clip into a file.
+// Tests of FileWriter, which records a clip into a file.
 #include <gtest/gtest.h>
 
 #include <cerrno>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Limits of the heap memory that encoding, decoding and an open reader of a clip take.
+// Tests that encoding and decoding a clip, and an open reader, take limited heap memory.
 #include <gtest/gtest.h>
 
 #include "clip/file/encoder.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Playing a mixer allocates nothing and throws nothing; its parts are checked when they are set.
+// Tests that playing a mixer allocates nothing and throws nothing. Invalid layers, reactions and
+// rules are refused when they are set.
 #include "clip/mixer/mixer.h"
 
 #include <gtest/gtest.h>

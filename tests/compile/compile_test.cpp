@@ -316,8 +316,8 @@ TEST(Compile, ColumnsOfQuaternionsStandAsTheLodsSwappedThem) {
   EXPECT_EQ(quaternion_column_order(g, 1, quaternions), finest);
 }
 
-// Two rows write one angle, and LOD 1 has only the first of them. The angle must be converted to a
-// quaternion at LOD 1 too.
+// Two rows of a joint group write the same angle; LOD 1 has only the first row. The angle must be
+// converted to a quaternion at LOD 1, too.
 TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {
   dna::Dna dna = make_face(1, 0, 1);
   dna.behavior.joint_groups = std::vector{make_group({2, 1}, {0}, {3, 3}, {60, 90})};

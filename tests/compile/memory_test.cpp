@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Heap memory of compile in proportion to the size of the face.
+// Tests that compile() takes heap memory in proportion to the size of the face.
 #include <gtest/gtest.h>
 
 #include "compile/compile.h"
@@ -43,8 +43,7 @@ INSTANTIATE_TEST_SUITE_P(Every, CompileMemory, testing::ValuesIn(kBombs),
                          [](const auto& about) { return std::string(about.param.name); });
 
 // Compares the numbers of steps that compile() takes for GUI tables of 10,000 and 20,000 rows. A
-// linear search in a list of
-// ranges would need four times as many for twice the rows.
+// linear search in a list of ranges would need four times as many steps for twice the rows.
 TEST(CompileSteps, OfAGuiTableGrowWithItsRows) {
   const auto steps = [](std::uint16_t rows) {
     core::Budget budget("this test", core::Budget::kUnlimited, core::Budget::kUnlimited);

@@ -108,8 +108,8 @@ void expect_vectors(const Vec3Array& before, const Vec3Array& after, const Matri
   }
 }
 
-// Three angles of up to 180 degrees in float32 have an error of less than 2 eps pi together; 8 eps
-// is above that.
+// Three angles of up to 180 degrees in float32 have together an error of less than 2 eps pi
+// radians. The elements of the rotation matrices may differ by 8 eps, which is more than this.
 void expect_rotation(const Dna& from, const Row& before, const Dna& to, const Row& after) {
   const Matrix expected = Change(from, to).rotation(rotation_of(from, before));
   const Matrix result = rotation_of(to, after);
@@ -268,7 +268,7 @@ void expect_group(const Dna& from, const Dna& to) {
         EXPECT_NEAR(b[i], translation[i] * change.unit, 200 * kEps);
         EXPECT_EQ(std::abs(b[6 + i]), std::abs(scale[i]));
       }
-      // Each scale delta of the source is in the result once, with its sign.
+      // The three scale deltas of the source occur once each in the result, and keep their signs.
       EXPECT_TRUE(std::is_permutation(a.begin() + 6, a.end(), b.begin() + 6));
       expect_rotation(from, {a[3], a[4], a[5]}, to, {b[3], b[4], b[5]});
     }
@@ -465,8 +465,8 @@ TEST(DnaCoordinates, ARowStaysInItsLods) {
   dna.descriptor.lod_count = 3;
   dna.behavior.joint_groups =
       std::vector<JointGroup>{make_group({4, 2, 0}, {3, 9, 1, 17}, {1, 2, 3, 4, 5, 6, 7, 8})};
-  // The source has x right, y up, z front; the result has x front, y right, z up. The axes rotate,
-  // so that the order xyz becomes yzx.
+  // The source has x right, y up, z front; the result has x front, y right, z up. So x becomes y, y
+  // becomes z and z becomes x, and the rotation order xyz becomes yzx.
   const Dna out = converted(dna, target_of({4, 1, 2}, 3, {1, 1, 1}));
   const JointGroup& g = out.behavior.joint_groups[0];
   EXPECT_EQ(g.lods, (Array<std::uint16_t>{4, 2, 0}));
@@ -732,7 +732,8 @@ TEST(DnaCoordinates, NumbersThatAreNoneStaySo) {
   CoordinateTarget target = target_of({4, 1, 3}, 5, {1, -1, 1});
   target.translation_unit = 0;
   const Dna out = converted(dna, target);
-  // x (right) becomes y, y (up) becomes -z, and z (front) becomes x; metres become centimetres.
+  // The conversion: x (right) becomes y, y (up) becomes -z, z (front) becomes x, and metres become
+  // centimetres.
   const Array<float>& t = out.definition.neutral_joint_translations.values;
   const std::vector<float> expected{200,       300,  -kInfinity, kNan, kInfinity,
                                     kInfinity, -100, kInfinity,  kNan};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Files that are cut short, patched and malformed: each gives a Dna that is usable in every way, or
-// an error with a field and an offset.
+// Tests files that are cut short, patched or malformed. Each must give a Dna that can be used in
+// every way, or an error with a field and an offset.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -216,9 +216,9 @@ TEST(HostileMalformed, FilesAreUsableOrRefusedAsTheirKindAsks) {
 
 // ---- a file that changes during reading
 
-// The first `honest_reads` reads give the bytes of the file. In later reads every byte whose offset
-// leaves the remainder `phase` when divided by 4 is increased by one. For one of the four phases
-// these are the lowest bytes of counts.
+// A file that changes during reading. The first `honest_reads` reads give the bytes of the file. In
+// later reads every byte whose offset leaves the remainder `phase` when divided by 4 is increased
+// by one. For one of the four values of `phase`, these bytes are the lowest bytes of counts.
 class ChangingSource final : public bytes::Source {
  public:
   ChangingSource(const Bytes& bytes, std::size_t honest_reads, std::uint64_t phase)

@@ -31,7 +31,8 @@ core::Result<Dna> parse_within(const Bytes& bytes, const Limits& limits) {
   return parse(source, options);
 }
 
-// A file at the limit is read; with a limit lower by one, the error names the limit.
+// Expects that a file is read within the limits `enough`, and that with the limits `too_little` the
+// error names the field `where` at which the limit was exceeded.
 void expect_limit(const Bytes& bytes, const Limits& enough, const Limits& too_little,
                   const std::string& where) {
   const auto read = parse_within(bytes, enough);
@@ -221,8 +222,8 @@ class CountingRows {
   mutable std::size_t asked_ = 0;
 };
 
-// The list of LODs is long and each LOD has all rows. Nevertheless each row may be
-// queried at most once.
+// The list with the number of rows of each LOD is long, and each LOD has all rows. Nevertheless
+// drop_rows() may query each row at most once.
 TEST(DnaSteps, OfDroppingRowsDoNotGrowWithTheListOfLods) {
   constexpr std::uint16_t kMost = 65535;
   for (const std::size_t entries : {1u, 5000u}) {

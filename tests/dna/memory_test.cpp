@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Limits of the heap memory that reading a file, JSON in both directions and the LOD filter take.
+// Tests that reading a file, conversions to and from JSON, and the LOD filter take limited heap
+// memory.
 #include <cstdio>
 #include <filesystem>
 

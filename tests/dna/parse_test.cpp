@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Bytes worked out by hand from the format, so that parser and writer do not only confirm each
-// other; and promises about hostile input that only native code can check.
+// Compares the parser and the writer with bytes that were worked out by hand from the format, so
+// that they do not only confirm each other. Also checks promises about hostile input that only
+// native code can check.
 #include "dna/file/parse.h"
 
 #include <gtest/gtest.h>
@@ -28,8 +29,9 @@ Bytes write_bytes(const Dna& dna, std::uint16_t minor = 8) {
   return bytes ? *bytes : Bytes{};
 }
 
-// A 2.2 file with one layer: descriptor "Ab", caucasian female of 40, one pair of metadata, metres,
-// radians, axes right up front, 3 LODs with max_lod 1, complexity "", database "d".
+// A file of version 2.2 with one layer, the descriptor: name "Ab", caucasian, female, age 40, one
+// pair of metadata, metres, radians, axes right up front, 3 LODs, max_lod 1, complexity "",
+// database name "d".
 const Bytes kDescriptorFile = {
     'D', 'N', 'A', 0,   2,   0,   2,      // signature, generation, version
     0,   0,   0,   1,                     // one layer

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which bytes of a file a partial load reads, and how often. The positions of layers, meshes and
-// lists come from the file's index and the sizes in the format, not from the parser.
+// Tests which bytes of a file a partial load reads, and how often. The positions of layers, meshes
+// and lists come from the file's index and the sizes in the format, not from the parser.
 #include <algorithm>
 #include <fstream>
 #include <iterator>
@@ -14,9 +14,9 @@ namespace {
 
 using namespace testing_support;
 
-// The size of the first read after a jump, and of the largest read. After the last byte that is
-// needed the reader may read at most as much as it has read in sequence before, and never more than
-// the window.
+// kFirstRead: size in bytes of the reader's first read after a jump. kWindow: size of its largest
+// read. After the last needed byte, the reader may read ahead at most as many bytes as it has read
+// in sequence before, and never more than kWindow.
 constexpr std::size_t kFirstRead = 512, kWindow = 64 * 1024;
 
 struct Region {
@@ -191,8 +191,9 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::ranges::find(names, name) != names.end();
 }
 
-// Whether a layer contains a count of controls, which a load with a definition reads. In files with
-// an empty rbfe the poses of rbfb are controls, and their count is stored after the solvers.
+// Whether a layer contains a number of controls, which is read whenever the definition is loaded.
+// If the layer rbfe (outputs of RBF poses) is empty, each pose of the layer rbfb (RBF solvers) is a
+// control, and the number of poses is stored after the solvers.
 bool counts_controls(const File& file, const std::string& layer) {
   const bool in_rbfb = layer == "rbfb" && file.layers.at("rbfe").size() == 8;
   return layer == "bhvr" || layer == "controls" || layer == "mlbh" || layer == "rbfe" || in_rbfb;
@@ -292,8 +293,9 @@ bool keeps(const Selection& s, std::size_t lod) {
   return std::ranges::find(s.kept, lod) != s.kept.end();
 }
 
-// Expects that a kept element is read completely, and at most `slack` bytes of a dropped one.
-// In: slack  for the first element, which may be read together with the number of elements
+// Expects that a kept element is read completely, and at most `slack` bytes of a dropped element.
+// In: slack  more than 0 for the first element of a list, of which bytes are read together with the
+//            number of elements before it
 void expect_whole_or_untouched(const RecordingSource& source, const Region& element, bool kept,
                                std::size_t slack) {
   if (kept) {
@@ -433,9 +435,8 @@ TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
 }
 
 // The first entry of the blend shape channels of make_full_face() gets one control after the other
-// as its input: the last raw one, the
-// corrective, both controls of networks, and the RBF pose. The channel is dropped if the layer that
-// computes its control is not loaded.
+// as its input: the last raw control, the corrective, both controls of networks, and the control of
+// the RBF pose. The channel is dropped if the layer that computes its control is not loaded.
 TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
   for (std::uint16_t control = 4; control <= 8; ++control) {
     Dna face = make_full_face();
@@ -461,8 +462,7 @@ TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
 }
 
 // In a file without layer rbfe, as before 2.5, the number of pose controls is the number of poses
-// in rbfb, which must be read. An error in rbfb names its field and
-// its offset.
+// in layer rbfb, which must be read. An error in rbfb names its field and its offset.
 TEST(PartialLoad, SaysWherePosesCannotBeCounted) {
   Dna face = make_full_face();
   face.rbf_behavior_ext = {};

@@ -85,8 +85,8 @@ TEST(FuzzFind006, NamesAnUnknownMemberAtTheRoot) {
   EXPECT_EQ(json_error("006-unknown-member-at-the-root.json").where, "mleh1.0");
 }
 
-// The fault: the second member silently replaced the first one. After a first repair the error had
-// neither field nor offset.
+// The fault: the second member replaced the first without an error. After a first repair there was
+// an error, but it had neither field nor offset.
 TEST(FuzzFind007, RefusesAMemberWithoutANameTwice) {
   const core::Error error = json_error("007-member-without-a-name-twice.json");
   EXPECT_EQ(error.code, core::ErrorCode::kInvalidValue);
@@ -118,8 +118,8 @@ TEST(FuzzFind010, RefusesToCompileMoreControlsThanIndicesReach) {
   EXPECT_EQ(promises::evaluation(*dna, 0), "");
 }
 
-// The fault: there was one finding for each LOD whose rows exceed the table, which together took
-// many times the file's size.
+// The fault: there was one finding for each LOD whose number of rows exceeds the table. Together
+// the findings took many times the file's size in memory.
 TEST(FuzzFind011, SaysOnceWhatIsWrongWithTheLevelsOfATable) {
   const auto findings = checked(find("011-rows-of-levels-beyond-the-table.dna"));
   const auto of_levels = [](const dna::Finding& f) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// regroup measures the evaluation time of the face before and after only if timing is requested.
+// regroup() measures the evaluation time of the given face and of the regrouped face only if timing
+// is requested.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

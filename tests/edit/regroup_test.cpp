@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Faces and options that regroup accepts or refuses.
+// Tests which faces and options regroup() accepts or refuses.
 #include <limits>
 #include <ostream>
 #include <utility>

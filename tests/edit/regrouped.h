@@ -37,8 +37,8 @@ inline std::vector<float> joints_of(const dna::Dna& dna, const std::vector<float
   return evaluate_once(rig.value(), raw, lod).joints;
 }
 
-// Expects that two faces give the same joints to the last bit, at every LOD and for both forms of
-// rotation.
+// Expects that two faces give the same joints to the last bit for the raw controls `raw`, at every
+// LOD, with rotations as Euler angles and as quaternions.
 inline void expect_same_function(const dna::Dna& a, const dna::Dna& b,
                                  const std::vector<float>& raw) {
   for (std::uint32_t lod = 0; lod < a.descriptor.lod_count; ++lod) {
@@ -61,8 +61,8 @@ inline dna::Dna two_joints() {
   return dna;
 }
 
-// Twelve joints in one region. Control 0 moves all of them, joint 5 by `small`. Control 1 moves
-// joint 3 by `small` and joint 4 by `large`; it is foreign to the region.
+// Twelve joints in one region. Control 0 moves all of them, joint 5 by `small`. Control 1,
+// which is foreign to the region, moves joint 3 by `small` and joint 4 by `large`.
 inline dna::Dna with_outliers(float small, float large) {
   dna::Dna dna = make_face(2, 0, 12);
   Indices outputs;

@@ -18,7 +18,10 @@ MiB = 1 << 20
 
 
 def fbx_arrays(path: Path) -> None:
-    """40 compressed FBX arrays of 256 MiB in 10 MB, in records that no reader needs."""
+    """Write an FBX of 10 MB with 40 compressed arrays, of which each unpacks to 256 MiB.
+
+    The arrays are in records that no reader needs.
+    """
     raw = zlib.compress(bytes(256 * MiB), 9)
     packed = b"d" + struct.pack("<III", 32 * MiB, 1, len(raw)) + raw
     inner = b"".join(_raw_record(b"Vertices", packed) for _ in range(40))
@@ -139,7 +142,13 @@ def rotation_order(path: Path) -> None:
 
 
 def _solvers(count: int, poses: list[int], outputs: int) -> risorius.Dna:
-    """core.dna with `count` RBF solvers of these poses; each pose writes `outputs` controls."""
+    """core.dna with RBF solvers added.
+
+    Args:
+        count: number of solvers.
+        poses: indices of the poses of each solver.
+        outputs: number of controls that each pose writes.
+    """
     dna = risorius.load(GOLDEN / "core.dna")
     first = risorius.Rig(dna).control_count  # behind the correctives
     pose_count = max(poses) + 1

@@ -366,7 +366,10 @@ def _run(words: list[str]) -> Done:
 
 
 def _begin_peak() -> int:
-    """Reset this process's largest memory use if possible. Returns the present one in bytes."""
+    """Reset this process's record of its largest memory use, if the system allows this.
+
+    Returns the memory in use at present, in bytes.
+    """
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
     return _peak()
@@ -430,7 +433,7 @@ def _in_a_process(work: Callable[[], None]) -> int:
 def _work(
     inputs: dict[str, bytes], name: str, seed: int, numbers: list[int], folder: Path, log: Path
 ) -> None:
-    """Run rounds; each logs its number when it begins, and [number, faults] when it has ended."""
+    """Run rounds. Each round logs its number when it begins, and [number, faults] when it ends."""
     limit = 8192 * MiB
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -90,7 +90,7 @@ MESHES: tuple[Shape, ...] = (
 )
 MESHES_OF_LOD = (9, 9, 8, 6, 6, 4, 4, 4)
 INFLUENCES = (12, 12, 12, 8, 8, 8, 4, 4)
-# A head mesh for each LOD; each grid has half the vertices of the previous LOD's.
+# One head mesh for each LOD. Its grid has half the vertices of the previous LOD's grid.
 HEADS: tuple[Shape, ...] = tuple(
     (
         "head",
@@ -247,7 +247,7 @@ def add_behavior(dna: risorius.Dna, random: np.random.Generator) -> None:
 
 
 def correctives(random: np.random.Generator) -> risorius.Psds:
-    """Correctives of 2 to 20 factors, most of them of few; some read a pose of the neck."""
+    """Correctives of 2 to 20 factors. Most have few factors, and some read a pose of the neck."""
     sizes = np.minimum(2 + random.geometric(0.45, CORRECTIVES) - 1, 20)
     sizes[0] = 20
     columns = [np.sort(random.choice(EXPRESSIONS, n, replace=False)) for n in sizes]
@@ -427,7 +427,13 @@ def meshes_of(lod: int, joints: Floats, random: np.random.Generator) -> list[ris
 
 
 def generate(seed: int = 1, deltas_per_channel: int | None = None) -> risorius.Dna:
-    """Generate the face. deltas_per_channel: if given, the only meshes are a head per LOD."""
+    """Generate the face.
+
+    Args:
+        seed: seed of the random numbers.
+        deltas_per_channel: mean number of deltas of a channel; then the only meshes are one head
+            per LOD. None: all meshes.
+    """
     random = np.random.default_rng(seed)
     dna = risorius.Dna()
     dna.name, dna.archetype, dna.gender, dna.age = "Fullscale", "other", "other", 30

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Bytes of a clip's file with corrected checksums, bytes of a block's curves, or values to store.
-// The first 4 bytes choose the kind and the numbers of controls and frames.
+// The input is one of three kinds: bytes of a clip's file, whose checksums are corrected; bytes of
+// the curves of a block; or values to encode. Its first 4 bytes choose the kind and the numbers of
+// controls and frames.
 #include "fuzz/promise.h"
 #include "support/clips.h"
 

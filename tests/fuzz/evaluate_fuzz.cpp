@@ -11,9 +11,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 4) return 0;
   const auto dna = promises::parse({data + 4, size - 4});
   if (!dna) return 0;
-  // The file states the number of correctives without a list of them, so that the size of the file
-  // does not limit it. The rig has lists of all controls, correctives included, for each LOD, and
-  // promises::evaluation() has one for each of at most kFrames frames. These lists are allowed.
+  // The file states the number of correctives without a list of them, so the size of the file does
+  // not limit this number. Lists of all controls, correctives included, are allowed on the heap:
+  // the rig has such lists for each LOD, and promises::evaluation() for each of at most kFrames
+  // frames.
   constexpr std::size_t kFrames = 64;
   const std::size_t lods = dna->descriptor.lod_count;
   bound.allow(16 * (lods + kFrames) * dna->behavior.psd_count);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Loading a part of a file equals loading all of it and removing the rest. The first 8 bytes choose
-// layers, LODs, limits and the kind of source; the file follows them.
+// Tests that loading a part of a file gives the same as loading the whole file and removing the
+// other parts. The first 8 bytes of the input choose the layers, LODs, limits and the kind of
+// source. The rest of the input is the file.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

@@ -63,8 +63,9 @@ class Seeds {
     add_rig(name, *read);
   }
 
-  /// Adds a file whose lists multiply each other to the folder `bombs`, as inputs for `evaluate`.
-  /// Each takes as long as a thousand other inputs, so that it is run only once and not mutated.
+  /// Adds inputs for the fuzz target `evaluate` to the folder `bombs`, made from a file for which a
+  /// reader may need steps in proportion to the product of two list lengths. Each input takes as
+  /// long as a thousand other inputs, so it is run only once and not mutated.
   void add_bomb(const std::string& name, const Bytes& file) {
     put_each("bombs", name, kControls, file, kLargestBomb);
   }

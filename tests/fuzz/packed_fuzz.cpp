@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Packed buffers of meshes. The first 4 bytes choose the packing. If the first byte is even, they
-// also choose the number of rows, and the rest is a packed buffer, usually a wrong one. If it is
-// odd, the rest is rows, which must survive packing and unpacking.
+// Tests packed buffers of meshes. The first 4 bytes of the input choose the packing. If the first
+// byte is even, they also choose the number of rows, and the rest of the input is a packed buffer,
+// which is usually invalid. If the first byte is odd, the rest is rows, which must survive packing
+// and unpacking.
 #include "author/packed.h"
 #include "fuzz/promise.h"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds public types of a module that contain Any: of arguments, results, members, aliases."""
+"""Finds Any in the public types of a module: of arguments, results, members and aliases."""
 
 from __future__ import annotations
 

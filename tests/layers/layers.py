@@ -44,7 +44,10 @@ def sources(root: Path, part: str) -> dict[str, str]:
 
 
 def room_of(path: str, rooms: Mapping[str, object]) -> str | None:
-    """The room of a file, a key of `rooms`: its path or its folder's path; None if neither is."""
+    """The room of a file: its path or the path of its folder, whichever is a key of `rooms`.
+
+    None if neither is a key.
+    """
     folder = PurePosixPath(path).parent.as_posix()
     return next((room for room in (path, folder) if room in rooms), None)
 
@@ -90,7 +93,8 @@ def _joined(folder: PurePosixPath, name: str) -> str:
 def imported(path: str, text: str, name: str, files: frozenset[str]) -> Iterator[Use]:
     """Yields imports of a Python file, including the ones in functions and by import_module.
 
-    Imports of the standard library are omitted. Code that is run from a text is "unreadable".
+    Imports of the standard library are omitted. A call that runs code from a string, such as eval,
+    is an import whose name cannot be read.
 
     Args:
         path: path of the file below the package's folder.

@@ -58,7 +58,7 @@ class Map:
     places: tuple[str, ...]
 
     def wrong(self, text: str) -> list[str]:
-        """A sentence for each listed name that does not exist, and for each that is not listed."""
+        """Sentences on listed names that do not exist, and on names of `there` that are missing."""
         named = [name.rstrip("/") for name in first_cells(text, self.head)]
         where = f"{self.page}, table {self.head}"
         lost = [n for n in named if not any((ROOT / place / n).exists() for place in self.places)]

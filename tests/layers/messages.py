@@ -91,7 +91,10 @@ def _is_docstring(node: ast.stmt) -> bool:
 
 
 def _whole_texts(node: ast.AST) -> list[ast.expr]:
-    """The texts in a part of a program, without the texts inside their values or in errors."""
+    """The texts in a syntax node.
+
+    Texts inside the inserted values of another text, and texts in `raise` statements, are left out.
+    """
     if isinstance(node, ast.Constant | ast.JoinedStr):
         return [node]
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add) and _template(node):

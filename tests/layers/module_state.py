@@ -27,8 +27,8 @@ REGISTRATION = "registration.py"
 WITHOUT_SESSION = ("logic/", "language/", "native.py")  # rooms that may not import scene
 CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]+")
 CACHES = {"cache", "lru_cache"}
-# Types and functions whose objects change when they are read, or are made to be changed. Not even a
-# name in UPPER_CASE may have such a value.
+# Types and functions whose objects change when they are read (such as an iterator), or exist to be
+# changed (such as a queue). Not even a name in UPPER_CASE may have such a value.
 ALWAYS_MUTABLE = {
     "deque", "defaultdict", "OrderedDict", "Counter", "ChainMap", "WeakKeyDictionary",
     "WeakValueDictionary", "WeakSet", "bytearray", "Queue", "SimpleQueue", "local", "iter", "count",

@@ -89,7 +89,10 @@ def of_file(path: str, text: str) -> list[str]:
 
 
 def unmarked(files: Mapping[str, str]) -> list[str]:
-    """`path:line: name` of uses in unmarked files; a sentence per marked file without uses."""
+    """`path:line: name` of each use in a file that posix_only.toml does not list.
+
+    Also a sentence for each listed file without such uses.
+    """
     used = {path: of_file(path, text) for path, text in files.items()}
     marked = POSIX["marked"]
     loose = [f"{path}:{use}" for path, uses in used.items() if path not in marked for use in uses]

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The point of a surface that is closest to another point, and the first point that a ray hits.
+// Tests ClosestPoints: the point of a surface that is closest to a given point, and the first point
+// of the surface that a ray hits.
 #include "register/closest.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +10,8 @@
 namespace risorius::registering {
 namespace {
 
-/// Two squares of side 1 that face each other: the normal at z = 0 points up, at z = 1 down.
+/// Two squares with sides of length 1 that face each other. The normal of the square at z = 0 is
+/// +z, the normal of the square at z = 1 is -z.
 ClosestPoints slit() {
   return ClosestPoints::make({{0, 0, 0},
                               {1, 0, 0},

@@ -45,8 +45,8 @@ static_assert(never_throws<decltype(&Instance::evaluate), Instance&, const float
 static_assert(never_throws<decltype(&Instance::set_lod), Instance&, std::uint32_t>);
 static_assert(never_throws<decltype(&Instance::set_mask), Instance&, std::size_t, float>);
 
-// A variant of the face with every part that is evaluated. operations: true: the networks are
-// operations of layer mlbe; false: the file has only a list of networks.
+// A variant of a face that has every part that is evaluated. If `operations` is true, operations of
+// the layer mlbe run the networks; otherwise the file has only a list of networks.
 struct Kind {
   const char* name;
   bool operations;

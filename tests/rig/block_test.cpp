@@ -209,8 +209,8 @@ std::string refused_field(BlockBytes& changed) {
   return rig ? "taken" : rig.error().where;
 }
 
-// At a LOD whose pieces copy rows that the joint groups do not compute, the pose would contain
-// values of an earlier frame.
+// The pieces of a LOD copy rows of the joint groups to the pose. If the groups do not compute one
+// of these rows at this LOD, the pose would contain its value of an earlier frame.
 TEST(Block, RowsThatNothingComputesAreRefused) {
   const Rig rig = must_compile(face_with_everything());
   BlockBytes level = bytes_of(rig);
@@ -227,7 +227,7 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
   EXPECT_EQ(refused_field(rows), "rig.joint_groups");
 }
 
-// Kernels add whole vectors to the rows of groups with many rows, so that such a vector must not
+// If a group has many rows, the kernels add whole SIMD vectors to its rows. No such vector may
 // contain rows of another group.
 TEST(Block, LongGroupsHaveWholeVectorsToThemselves) {
   constexpr std::uint16_t kLong = 18;
@@ -325,8 +325,8 @@ TEST(Block, ChannelsOfARunFollowEachOther) {
   }
 }
 
-// No array of the rig's bytes limits mask_count, the number of masks of the networks' regions. A
-// few bytes must not demand a large workspace.
+// mask_count is the number of masks of the networks' regions. The rig's bytes have no array of this
+// length, so a few bytes could demand a large workspace if no other check limited mask_count.
 TEST(Block, ScratchIsHeldAgainstTheBlock) {
   const Rig rig = must_compile(face_with_everything());
   constexpr std::size_t kRigHeader = 32;  // bytes before the RigHeader

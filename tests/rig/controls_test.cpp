@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The optional check that raw controls are finite, and the distances and weights of the poses of an
-// RBF solver.
+// Tests two functions: the optional check that raw controls are finite, and solver_poses(), which
+// gives the distances and weights of the poses of an RBF solver.
 #include <gtest/gtest.h>
 
 #include <limits>

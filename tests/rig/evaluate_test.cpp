@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The semantics of each stage, on faces small enough to compute by hand.
+// Tests each stage of an evaluation on faces that are small enough to compute by hand.
 #include "rig/stages/evaluate.h"
 
 #include <algorithm>
@@ -59,9 +59,9 @@ TEST(EvaluateJoints, LastGroupThatWritesARowWins) {
   EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}, 1).joints[4], 1.0f) << "no row at this LOD";
 }
 
-// Of four joints the first rotates at both LODs, the second only at LOD 0, the third only moves and
-// the fourth does nothing. Each joint must get the w of its quaternion, whatever the memory of the
-// pose contained before.
+// Of four joints, the first rotates at both LODs, the second only at LOD 0, the third is only
+// translated, and the fourth does not move. Each joint must get the w of its quaternion, whatever
+// the memory of the pose contained before.
 TEST(EvaluateJoints, EveryQuaternionHasItsW) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups =
@@ -116,8 +116,9 @@ TEST(EvaluateJoints, NanStaysInTheGroupsThatHaveItAsAColumn) {
 
 // ---- correctives
 
-// Control 2 is a corrective of controls 0 and 1. In: columns, values  for each entry of the
-// corrective, the control that is its factor, and the factor's weight
+// A rig whose control 2 is a corrective of controls 0 and 1.
+// In: columns  the control of each factor of the corrective
+//     values   the weight of each factor
 Rig corrective_rig(std::vector<std::uint16_t> columns, std::vector<float> values) {
   dna::Dna dna = make_face(2, 1, 1);
   dna.behavior.psds.rows = std::vector<std::uint16_t>(columns.size(), 2);
@@ -282,8 +283,9 @@ TEST(EvaluateMaps, LodUsesLeadingRowsEvenInsideARun) {
   EXPECT_EQ(evaluate_once(rig, {0.25f}, 1).animated_maps[0], 0.25f);
 }
 
-// A run of rows is skipped while its input is 0, if it adds nothing then. The result must equal a
-// loop over all rows.
+// A run consists of successive rows with the same input and output. The evaluator skips a run while
+// its input is 0, if the run adds nothing for the input 0. The result must equal a loop over all
+// rows.
 TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
   constexpr std::uint16_t kRaw = 40, kMaps = 7;
   constexpr std::size_t kRows = 300;
@@ -338,8 +340,8 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
 
 // ---- blend shapes
 
-// With few active controls each active control lists its channels; with many, every channel reads
-// its control. The result must be the same.
+// If few controls are active, the evaluator visits only the channels of each active control; if
+// many are active, it visits all channels. The result must be the same.
 TEST(EvaluateShapes, ChannelsFollowTheirControlsHoweverManyAreActive) {
   constexpr std::uint16_t kRaw = 64, kShapes = 150;
   std::mt19937 random(6);

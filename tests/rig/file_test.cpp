@@ -117,8 +117,7 @@ TEST_F(RigFile, PrefixesAndMoreBytesAreRefused) {
 }
 
 // The fields of the header begin at these bytes: magic 0, version 7, byte order 8, header size 12,
-// size 16, hash 24, the numbers of
-// RigHeader 32.
+// size 16, hash 24, the numbers of RigHeader 32.
 TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
   const auto flipped = [&](std::size_t at) { return static_cast<std::uint8_t>(bytes_[at] ^ 1); };
   for (const Trust trust : kTrusts) {
@@ -135,8 +134,8 @@ TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
   }
 }
 
-// One bit is flipped at a time, in every 13th byte in turn. Arrays begin on multiples of 64, so
-// that each array together with the gap after it is hit at least four times.
+// One bit is flipped at a time, in every 13th byte. Arrays begin on multiples of 64 bytes, so at
+// least four flipped bits are in each array or in the gap after it.
 TEST_F(RigFile, AFlippedBitOfOnesOwnFileIsFound) {
   const path file = folder_ / "face.rig";
   for (std::size_t at = 0; at < bytes_.size(); at += 13) {
@@ -189,8 +188,8 @@ TEST_F(RigFile, AFolderThatIsNotThereCannotBeWritten) {
 
 constexpr uid_t kNobody = 65534;
 
-// The wrong index shows which check was made: only the full check finds it. With Trust::kOwner the
-// rights of the file decide about the check.
+// The file contains a wrong index, which only the full check finds. With Trust::kOwner the full
+// check is made only if other users may write the file.
 TEST_F(RigFile, AFileThatOthersMayWriteGetsTheFullCheck) {
   const path file = write(with_wild_index());
   for (const ReadBy by : {ReadBy::kCopy, ReadBy::kMap}) {

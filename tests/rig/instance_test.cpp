@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A face in a sequence of frames: a corrective or a network that reads a later stage gets its value
-// from the frame before.
+// Tests Instance, a face in a sequence of frames. A corrective or a network that reads the output
+// of a later stage gets the value of the frame before.
 #include "rig/stages/instance.h"
 
 #include "rig/stages/evaluate.h"

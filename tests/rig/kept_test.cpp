@@ -31,8 +31,8 @@ void add_channels(dna::Dna& dna, std::uint32_t seed) {
   dna.behavior.blend_shape_channels.output_indices = std::move(outputs);
 }
 
-// Each raw control drives two runs of rows of different maps. For every third control a map
-// is not 0 while the control is 0.
+// Adds animated maps. Each raw control drives two runs of table rows, which write different maps.
+// For every third control, a map is not 0 while the control is 0.
 void add_maps(dna::Dna& dna) {
   dna.definition.animated_map_names = names("map", kInputs);
   dna::Conditionals& table = dna.behavior.animated_maps.conditionals;
@@ -56,8 +56,8 @@ void add_maps(dna::Dna& dna) {
 }
 
 // A face with correctives of two to four raw controls, and joint groups that list all controls. The
-// values and the factors of the correctives are random. Of the sizes, only the number of channels
-// depends on the seed.
+// factors of the correctives and the values of the joint groups are random. All seeds give the same
+// sizes, except for the number of channels.
 dna::Dna correcting_face(std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> value(-2.0f, 2.0f);
@@ -87,7 +87,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
       outputs[r] = static_cast<std::uint16_t>(static_cast<std::size_t>(first) + r);
     }
     std::vector<float> values(inputs.size() * outputs.size());
-    // A third of the columns has only zeros, in faces with successive seeds not the same third.
+    // A third of the columns has only zeros; for successive seeds it is another third.
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = (i % inputs.size() + seed) % 3 == 0 ? 0.0f : value(random);
     }
@@ -162,8 +162,8 @@ TEST(Kept, IsOfOneRigThoughAnotherTakesItsPlace) {
   Workspace work;
   std::vector<float> raw(kInputs, 0.5f);
   for (const std::uint32_t seed : {1u, 2u}) {
-    // The second rig may have the same address as the first one had, so that only Rig::number tells
-    // them apart.
+    // The first rig is destroyed before the second is made, so both may have the same address. Then
+    // only Rig::number distinguishes them.
     const Rig rig = must_compile(correcting_face(seed));
     if (seed == 1) work = make_workspace(rig);
     work.traversal = Traversal::kListed;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Heap memory of opening a compiled rig and of a workspace for it.
+// Tests that opening a compiled rig, and workspaces for it, take limited heap memory.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compiles the blend shape targets of a mesh of three vertices, and adds them with weights.
+// Tests Morph on a mesh of three vertices: compiles its blend shape targets, and adds them with
+// weights.
 #include "rig/outputs/morph.h"
 
 #include "support/face.h"

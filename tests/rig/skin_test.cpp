@@ -202,7 +202,8 @@ struct Mesh {
   }
 };
 
-// A mesh with random influences. In: counts  numbers of influences, which the vertices get in turn
+// A mesh with random influences.
+// In: counts  vertex v has counts[v % counts.size()] influences
 Mesh random_mesh(std::size_t vertices, std::span<const std::uint32_t> counts, std::uint32_t bones,
                  std::uint32_t seed) {
   std::mt19937 random(seed);
@@ -300,7 +301,7 @@ TEST(Skin, WhatIsNotFiniteSpoilsTheVerticesOfItsBoneAlone) {
   Mesh mesh = random_mesh(500, counts, 50, 12);
   const std::vector<float> clean = evaluated(kernels(), mesh, matrices);
   // The matrix of bone 0 is NaN. Vertices must become NaN only if they have a weight on it,
-  // although vertices with fewer influences get further ones of weight 0.
+  // although vertices with fewer influences are filled up with influences of weight 0.
   for (std::size_t i = 0; i < 12; ++i) matrices[i] = kNaN;
   mesh.points[0] = kNaN;
   const std::vector<float> out = evaluated(kernels(), mesh, matrices);

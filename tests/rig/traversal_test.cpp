@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The orders in which columns of the joint groups are visited: only the columns of active controls,
-// listed or added one by one, or all columns.
+// Tests the three ways to visit the columns of the joint groups. kListed lists the columns of
+// active controls, kAdded adds these columns one by one, and kWhole visits all columns.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,9 +17,8 @@ using namespace testing_support;
 
 constexpr std::size_t kRaw = 24, kJoints = 40;
 
-// Joint groups of 1 to 90 rows, with about half of the rows of the next finer LOD, or none, at LODs
-// 1 and 2. Some groups write the same
-// attributes, and some attributes between them have no row.
+// A face whose joint groups have 1 to 90 rows at LOD 0. LODs 1 and 2 have about half of the rows of
+// the next finer LOD, or none. Some attributes are written by two groups, and some by no group.
 dna::Dna many_groups() {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> value(-2.0f, 2.0f);
@@ -163,8 +162,8 @@ TEST_P(Traversals, OfABatchGiveTheBitsOfTheFrameAlone) {
   }
 }
 
-// The attributes of a group without active columns that share a block of 16 attributes with an
-// active group must be 0, and not keep their values of the frame before.
+// A group without active columns may share a block of 16 joint attributes with an active group. Its
+// attributes must then be 0, and not keep their values of the frame before.
 TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   const Rig rig = must_compile(dna_, kernels_);
   Workspace work = make_batch_workspace(rig), fresh = make_workspace(rig);

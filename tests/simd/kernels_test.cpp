@@ -370,8 +370,9 @@ struct Turn {
   float parity;
 };
 
-// The quaternion (x, y, z, w) of rotations about three axes, of which the first in turn.order is
-// applied first, in double. In: angles  float[3], radians about x, y and z
+// The quaternion (x, y, z, w) of three rotations about x, y and z, computed in double. turn.order
+// is the order in which they are applied.
+// In: angles  float[3], radians about x, y and z
 std::array<double, 4> product_of_turns(const Turn& turn, const float* angles) {
   std::array<double, 4> q{0, 0, 0, 1};
   for (const std::uint8_t axis : turn.order) {
@@ -392,7 +393,7 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
   std::mt19937 random(10);
   for (std::size_t t = 0; t < 2 * std::size(turns); ++t) {
     const Turn& turn = turns[t / 2];
-    // Alternately large angles and angles that need no reduction.
+    // Alternately angles up to 20 radians, and angles up to pi / 2, which need no reduction.
     const float most = t % 2 == 0 ? 20.0f : 1.55f;
     std::uniform_real_distribution<float> angle(-most, most);
     for (const std::size_t count : {0u, 1u, 15u, 16u, 17u, 40u}) {
@@ -425,8 +426,8 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
   }
 }
 
-// Rotations are computed together with others, large angles with small ones. Each must have the
-// bits that it has alone.
+// Several rotations are computed in one call, with large and small angles. Each result must have
+// the same bits as if the rotation were computed alone.
 TEST_P(SimdKernels, TurnRotationsTogetherAsAlone) {
   constexpr std::size_t kCount = 700, kStride = 10;
   std::mt19937 random(12);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Least squares with bounds: a strictly convex problem has one solution, and the conditions of
-// Karush, Kuhn and Tucker identify it.
+// Tests least squares with bounds. Each problem is strictly convex, so it has one solution, which
+// the conditions of Karush, Kuhn and Tucker identify.
 #include "solve/bounded.h"
 
 #include <gtest/gtest.h>
@@ -21,11 +21,12 @@ Doubles random(std::mt19937& random, std::size_t n, double low, double high) {
   return out;
 }
 
-/// How far x violates the conditions of a minimum with bounds; 0: not at all. Expects x to be
-/// within its bounds. In: slope      gradient of the smooth part at x
+/// The largest violation of the conditions of a minimum with bounds; 0: x is the minimum. Expects x
+/// to be within its bounds.
+/// In: slope      gradient of the smooth part of the function at x
 ///     low, high  bounds of x
-///     rest       values of x at which the sparse part is 0
-///     kink       slope of the sparse part on both sides of x = rest
+///     rest       values of x at which the sparse part of the function is 0
+///     kink       slope of the sparse part: kink above rest, -kink below rest
 double violation(const Doubles& x, const Doubles& slope, const Doubles& low, const Doubles& high,
                  const Doubles& rest, const Doubles& kink) {
   double worst = 0.0;

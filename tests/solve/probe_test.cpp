@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A skin with known motion: an arm of two joints, a shape and a corrective.
+// Tests Probe on a skin with known motion: an arm with two joints, a blend shape and a corrective.
 #include "solve/probe.h"
 
 #include <gtest/gtest.h>

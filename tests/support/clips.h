@@ -99,8 +99,8 @@ inline void seal(Bytes& bytes) {
 
 /// Checks reading of any bytes as a clip. It must give a clip that can be written and read again
 /// without a change (of the events only the number is compared), or an error that names a part of
-/// the file; an offset, if the error has one, must be inside the file. Out: the broken promise, or
-/// "" if none
+/// the file; an offset, if the error has one, must be inside the file.
+/// Out: a sentence about the broken promise, or "" if none is broken
 inline std::string reading_clip(View bytes, clip::Ends ends) {
   clip::Limits limits;
   limits.values = 1u << 15;
@@ -122,8 +122,8 @@ inline std::string reading_clip(View bytes, clip::Ends ends) {
 }
 
 /// Checks decoding of any bytes as the curves of a block. They must be refused with a message, or
-/// decoding all curves together must succeed exactly if each curve can be decoded alone. Out: the
-/// broken promise, or "" if none
+/// decoding all curves together must succeed exactly if each curve can be decoded alone.
+/// Out: a sentence about the broken promise, or "" if none is broken
 inline std::string reading_curves(View bytes, std::size_t controls, std::size_t frames) {
   const auto curves = clip::EncodedCurves::open(bytes, controls, frames);
   if (!curves) return curves.error().message.empty() ? "an error that says nothing" : "";
@@ -143,8 +143,8 @@ inline std::string reading_curves(View bytes, std::size_t controls, std::size_t 
 
 /// Checks encoding of any bytes as float32 curves of one block; bytes beyond whole frames or beyond
 /// the longest block are ignored. Decoding, of each curve alone and of all together, must give the
-/// same bits, and the encoded curves may be at most one byte longer than the float32 values. Out:
-/// the broken promise, or "" if none
+/// same bits, and the encoded curves may be at most one byte longer than the float32 values.
+/// Out: a sentence about the broken promise, or "" if none is broken
 inline std::string keeping_bits(View bytes, std::size_t controls) {
   const std::size_t frames =
       std::min<std::size_t>(bytes.size() / 4 / controls, clip::kMostBlockFrames);

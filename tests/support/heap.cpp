@@ -18,8 +18,8 @@ void __libc_free(void*);
 
 namespace {
 
-// Bytes of heap memory in use, their maximum, and the bytes in use when counting began. The tests
-// of this executable have one thread.
+// now: bytes of heap memory in use. most: their maximum since counting began. begin: the bytes in
+// use when counting began. No lock is needed, because the tests of this executable have one thread.
 std::ptrdiff_t now = 0, most = 0, begin = 0;
 
 std::ptrdiff_t size_of(void* p) { return static_cast<std::ptrdiff_t>(malloc_usable_size(p)); }

@@ -188,9 +188,9 @@ bool same(const rig::Pose& a, const rig::Pose& b) {
          same(a.animated_maps.data(), b.animated_maps) && same(a.controls.data(), b.controls);
 }
 
-// The largest difference between joint values that another order of additions or fused operations
-// may cause. For n products of a value and a control, with each sum rounded once, it is 2 n eps *
-// sum |value * control|. Controls are at most 2 here.
+// The largest difference that another order of additions, or fused operations, may cause between
+// joint values. For n products of a value and a control, with each sum rounded once, it is 2 n eps
+// * sum |value * control|. The controls of compared poses are at most 2.
 float joint_tolerance(const Dna& dna, const rig::Rig& rig) {
   const float n = static_cast<float>(rig.control_count) + 1;
   constexpr float kEpsilon = std::numeric_limits<float>::epsilon();
@@ -213,8 +213,9 @@ rig::Pose pose_of(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
 // step wrote in this frame.
 enum class Origin { kCompiled, kForged };
 
-// Checks that the first and the last frame of a batch equal these frames evaluated alone; the last
-// frame has half the controls. The batch of a forged rig is evaluated but not compared.
+// Checks that the first and the last frame of a batch equal the same frames evaluated alone. In the
+// last frame all controls have half their values. The batch of a forged rig is evaluated but not
+// compared.
 std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, bool settle,
                   Origin origin) {
   constexpr std::size_t kCount = simd::kFrames + 3;
@@ -243,9 +244,9 @@ std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
   return kKept;
 }
 
-// Checks that all three ways to visit the columns of a joint group give the same joints; those of a
-// forged rig are not compared. -0 equals 0: a product below the float range may leave a sum at -0,
-// which the column of a control at 0 changes to 0.
+// Checks that all three ways to visit the columns of a joint group give the same joints. The joints
+// of a forged rig are not compared. -0 equals 0: a product below the float range may leave a sum at
+// -0, which the column of a control at 0 changes to 0.
 std::string traversals(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, Origin origin) {
   rig::Workspace work = rig::make_workspace(rig);
   rig::Pose listed = rig::make_pose(rig), whole = listed, added = listed;
@@ -276,9 +277,9 @@ std::string instance(const rig::Rig& rig, const Controls& raw, std::uint32_t lod
   return kKept;
 }
 
-// Evaluates a rig in every way at LODs 0 to 3, but not further than one number after its last LOD.
-// At its last LOD, if that is above 3, only one settled pose is made. Out: poses  the settled pose
-// of each LOD is appended
+// Evaluates a rig in every way at LODs 0 to 3. If the rig has fewer LODs, the highest number is the
+// first that no LOD has. If its last LOD is above 3, one settled pose is made at this LOD.
+// Out: poses  the settled pose of each evaluated LOD is appended
 std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<rig::Pose>& poses,
                          Origin origin = Origin::kCompiled) {
   for (std::uint32_t lod = 0; lod <= std::min(rig.lod_count, 3u); ++lod) {

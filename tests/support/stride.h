@@ -43,9 +43,9 @@ inline Steps shared_steps() {
   return {0, kStride};
 }
 
-// Offsets of the bytes of a file that a test changes. Where the other file has the same bytes
-// around an offset, only every fourth offset is used, because all bytes of the other file are
-// changed too.
+// Offsets of the bytes of `file` that a test changes. The test changes all bytes of the file
+// `other` too. So, if `other` contains the 40 bytes around an offset of `file`, only every fourth
+// such offset is used.
 inline std::vector<std::size_t> bytes_to_change(const std::vector<std::uint8_t>& file,
                                                 const std::vector<std::uint8_t>& other) {
   constexpr std::size_t kBefore = 24, kAround = 40;

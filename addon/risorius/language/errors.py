@@ -87,14 +87,14 @@ def best(message: str, language: str, depth: int) -> _Found:
 def _value(name: str, value: str, language: str, depth: int) -> _Found:
     """Translate a value of a message.
 
-    In a value for `_SEVERAL`, each text between commas is translated. In a list of names without a
-    translation, only the "and" is translated.
+    In the value of the name "changes", each text between commas is translated. In a list of names
+    without a translation, only the "and" is translated.
 
     Args:
         name: name of the value in the row's template.
         value: the value's text in the message.
         language: a language of `tables.languages`, not "".
-        depth: number of messages around the value.
+        depth: number of messages that contain this value, one inside another; 1 or more.
     """
     if name == _SEVERAL:
         each = [best(part, language, depth) for part in value.split(", ")]
@@ -108,7 +108,11 @@ def _value(name: str, value: str, language: str, depth: int) -> _Found:
 
 @cache
 def rows(language: str) -> list[_Row]:
-    """All rows of errors_<language>.toml. Args: language  of `tables.languages`, not ""."""
+    """All rows of errors_<language>.toml.
+
+    Args:
+        language: a language of `tables.languages`, not "".
+    """
     return [_row(*row) for row in tables.error_rows(language).items()]
 
 

@@ -17,16 +17,19 @@ else:
 
 
 class RunsBeside(_Base):
-    """Base of operators with a background task; they define `finish`, `shown` and `cancelled_text`.
+    """Base of operators that run a task in the background.
+
+    Subclasses define `finish`, `shown` and `cancelled_text`.
 
     In scripts, in Blender's background mode and in the redo panel, the operator waits for the
-    result instead.
+    result of the task instead.
     """
 
     def wait_beside(self) -> None:
-        """Let the next `begin` run its task beside the interface, if Blender has one.
+        """Let the next call of `begin` run its task in the background, if Blender has an interface.
 
-        `invoke` calls this. An `execute` without `invoke`, as in a script, waits for the result.
+        `invoke` calls this. An `execute` without `invoke`, as in a script, waits for the result
+        of the task.
         """
         self._beside = not bpy.app.background
 
@@ -38,7 +41,8 @@ class RunsBeside(_Base):
             task: the task of the operator.
         """
         self._running = task
-        # The redo panel runs the same operator object again, so the flag is cleared.
+        # The redo panel runs the same operator object again, and should wait for the result. So the
+        # flag is cleared.
         beside, self._beside = getattr(self, "_beside", False), False
         if not beside:
             task.run()
@@ -71,7 +75,7 @@ class RunsBeside(_Base):
         return {"PASS_THROUGH"}
 
     def cancel(self, context: Context) -> None:
-        """Cancel the task; Blender also calls this when it closes."""
+        """Cancel the task; Blender also calls this method when Blender closes."""
         self._running.cancel()
         self._end(context)
 
@@ -82,11 +86,11 @@ class RunsBeside(_Base):
         context.workspace.status_text_set(None)
 
     def finish(self, context: Context) -> Result:
-        """Use the result or the error of the task."""
+        """Use the result of the ended task, or report the error of the task."""
         raise NotImplementedError
 
     def shown(self, share: int) -> str:
-        """The text of the status bar.
+        """The text of the status bar while the task runs.
 
         Args:
             share: finished part of the task in per cent, 0 to 100.
@@ -94,5 +98,5 @@ class RunsBeside(_Base):
         raise NotImplementedError
 
     def cancelled_text(self) -> str:
-        """The report after Esc."""
+        """The sentence that is reported after Esc has cancelled the task."""
         raise NotImplementedError

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# A type checker expects a Context with a scene here; Blender's own methods accept any:
+# The methods here accept only a Context with a scene, Blender's own methods accept any context. A
+# type checker would report this difference, so this check is off in this file:
 # pyright: reportIncompatibleMethodOverride=false
 """Blender's classes for type annotations of operators, panels and menus.
 
-In the stubs of Blender's API a panel may lack a layout. While a panel is drawn it always has one,
-so code need not test this. At run time all names here are Blender's own classes. Any is used
-because a list shows items of any kind.
+In the type stubs of Blender's API, the layout of a panel may be None. A panel that is drawn always
+has a layout, so the classes here declare it as present. At run time all names here are Blender's
+own classes. Arguments of UIList have the type Any, because a list shows items of any type.
 """
 
 from typing import TYPE_CHECKING, Any, TypeAlias

@@ -46,7 +46,8 @@ def explain(path: str | Path, error: Exception) -> str:
     """One sentence about an error with a file.
 
     Args:
-        path: path of the file; the sentence begins with its name, unless the error contains it.
+        path: path of the file; the sentence begins with the file's name, unless the text of the
+            error contains this name.
         error: error from reading or writing the file.
     """
     reason = error.strerror if isinstance(error, OSError) else None
@@ -65,7 +66,9 @@ def system_path(path: str) -> str:
 
 
 def proposed_file(name: str, ending: str) -> str:
-    """The name that a file dialog proposes; names from a .blend cannot lead to another folder.
+    """The name of a file that a file dialog proposes.
+
+    Characters such as "/" are replaced, so the name cannot lead to another folder.
 
     Args:
         name: name of the exported object or action.
@@ -131,22 +134,28 @@ def face_controls(context: Context) -> ArmatureObject:
 
 
 def as_seen(context: Context) -> bool:
-    """Whether the preferences define left and right as the viewer sees them."""
+    """Whether left and right in the interface are the viewer's sides, not the face's own sides.
+
+    This is the setting `sides` of the add-on's preferences.
+    """
     addon = context.preferences.addons.get(native.ADDON)
     return addon is None or getattr(addon.preferences, "sides", "SEEN") == "SEEN"
 
 
 class FaceOperator(OperatorBase):
-    """Base of operators on the active face. Class attributes define which faces are suitable."""
+    """Base of operators on the active face.
+
+    Class attributes decide for which faces `poll` makes the operator available.
+    """
 
     bl_options = {"REGISTER", "UNDO"}
-    whole_face = True  # whether the face needs its control armature and its DNA
+    whole_face = True  # whether `poll` requires the control armature and DNA data of the face
     baked_too = False  # whether faces with baked actions are accepted
     by_sliders = False  # whether a face that its face board moves is rejected
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the active face is suitable; if not, set the poll message."""
+        """Whether the operator is available for the active face; if not, set the poll message."""
         if not usable(cls):
             return False
         rig = parts.active_rig(context)

@@ -19,7 +19,8 @@ NAMES = "Names"  # translation context of names, which are not translated
 _SIDEBAR = 280  # default width of Blender's sidebar in pixels
 _EDGES = 36  # pixels of the sidebar for tabs and the panel's margins
 _MARGIN = 12  # pixels around the text of a label
-# locale: the current locale of Blender; given: the language whose table Blender has received.
+# "locale" -> the locale of Blender at the last call of follow_language; "given" -> the language
+# whose translation table is registered with Blender, or "".
 _language = session.keep("words.language", lambda: {"locale": "", "given": ""}, ("unregister",))
 
 
@@ -27,7 +28,7 @@ class Ruler:
     """Computes which labels fit completely into a share of the sidebar's width."""
 
     def __init__(self, context: Context, share: float) -> None:
-        """Measure the sidebar; without one, the width of a newly opened sidebar is used.
+        """Measure the sidebar; without a sidebar, use the width of a newly opened sidebar.
 
         Args:
             context: context with the sidebar's region.
@@ -64,7 +65,7 @@ def width_of(text: str, points: float, font: str = "") -> float:
 def prop_or(
     layout: UILayout, owner: bpy.types.bpy_struct, name: str, empty: float | str, meaning: str
 ) -> None:
-    """Draw a property; if it has its special value, draw the meaning of this value below it.
+    """Draw a property; if it has the value `empty`, draw the meaning of this value below it.
 
     Args:
         layout: layout of the panel or dialog.
@@ -80,7 +81,9 @@ def prop_or(
 
 
 def search(layout: UILayout, owner: bpy.types.bpy_struct, name: str) -> None:
-    """Draw a search field with our placeholder; Blender translates its own into few languages only.
+    """Draw a search field with the add-on's own grey text "Search".
+
+    The grey text of Blender is translated into few languages only.
 
     Args:
         layout: layout of the panel.
@@ -115,9 +118,10 @@ def say(text: str, **values: object) -> str:
     """Translate a label or sentence into the user's language.
 
     Args:
-        text: English text of the table with {names} of values, or a Sentence.
-        values: name -> number, name or Sentence. Sentences are translated, and so are error
-            messages of the package in values named error, reason, said, trouble or why.
+        text: English text of the translation table, with the names of `values` in braces; or a
+            Sentence, which contains its values.
+        values: values that replace the braces. A Sentence is translated, and so are error messages
+            of the package in values named error, reason, said, trouble or why.
     """
     follow_language()
     if isinstance(text, Sentence):
@@ -128,7 +132,10 @@ def say(text: str, **values: object) -> str:
 
 
 def _local_value(name: str, value: object) -> object:
-    """The value; a Sentence or an error message of the package is translated."""
+    """A value for a sentence, translated if it is a Sentence or an error message of the package.
+
+    Only a value whose `name` is in `_REASONS` is taken for an error message.
+    """
     if isinstance(value, Sentence):
         return say(value)
     if name in _REASONS and isinstance(value, str):
@@ -160,7 +167,10 @@ def local(text: str) -> str:
 
 
 def mark(text: str) -> str:
-    """Mark a text that Blender or a later `say` translates, for the test of our tables."""
+    """Return a text unchanged; the test of the translation tables thus finds the text in the code.
+
+    Blender or a later call of `say` translates the text.
+    """
     return text
 
 
@@ -187,7 +197,7 @@ def bar(layout: UILayout, value: float) -> None:
 
 
 def follow_language() -> None:
-    """Register the table of the user's language with Blender, if the language changed."""
+    """Register the translation table of the user's language, if Blender's language has changed."""
     locale = bpy.app.translations.locale or ""
     if locale == _language["locale"]:
         return
@@ -207,7 +217,7 @@ def forget_language() -> None:
 
 
 def give_context(cls: type) -> None:
-    """Make Blender search the add-on's table first for texts of a class and its properties.
+    """Make Blender translate texts of a class and its properties with the add-on's table first.
 
     Args:
         cls: operator, panel, menu or property group, before it is registered.

@@ -25,8 +25,9 @@ bool passes(const Vec3& from, const Vec3& inverse, const Vec3& low, const Vec3& 
   return std::max(a.cwiseMin(b).maxCoeff(), 0.0) <= a.cwiseMax(b).minCoeff();
 }
 
-/// Where a ray meets a triangle: the barycentric coordinates of b and c, and the distance from
-/// `from` in lengths of `way`. Nullopt if the ray misses the triangle or is parallel to it.
+/// The point at which the ray from `from` along `way` meets triangle a, b, c. Its parts are the
+/// barycentric coordinates of b and of c, and the distance from `from` divided by the length of
+/// `way`. Nullopt if the ray misses the triangle or is parallel to it.
 /// Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997)
 std::optional<Vec3> meeting(const Vec3& from, const Vec3& way, const Vec3& a, const Vec3& b,
                             const Vec3& c) {

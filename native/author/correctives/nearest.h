@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The nearest triangle to a point, found in a tree of boxes.
+// Finds the triangle that is nearest to a point or that a ray meets, in a tree of boxes.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,8 +16,8 @@ namespace risorius::author::detail {
 
 using Vec3 = Eigen::Vector3d;
 
-/// A search tree over the triangles of a surface. It refers to the triangles and positions that its
-/// constructor gets, so that these must outlive the tree.
+/// A search tree over the triangles of a surface. It refers to the triangles and positions that the
+/// constructor gets; both must outlive the tree.
 class Nearest {
  public:
   struct Hit {
@@ -34,8 +34,8 @@ class Nearest {
   /// The first triangle that a ray meets, at its front or back, if it is nearer than `reach`.
   /// In: direction  of length 1
   std::optional<Hit> first_hit(const Vec3& from, const Vec3& direction, double reach) const;
-  /// The triangle nearest to p among those nearer than `reach` for whose index `takes` returns
-  /// true.
+  /// The triangle that is nearest to p, if it is nearer than `reach`. Only triangles for whose
+  /// index `takes` returns true are searched.
   std::optional<Hit> find(const Vec3& p, double reach,
                           core::FunctionRef<bool(std::uint32_t)> takes) const;
 

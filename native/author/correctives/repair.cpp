@@ -21,17 +21,17 @@ namespace {
 // rounds than steps, because undoing may cause faults at other vertices.
 constexpr std::size_t kFades = 9, kSteps = 6;
 constexpr double kUndone = 2.0;  // cost of undoing the whole motion; all faults of one kind cost 1
-// A repair with at most this cost ends the search for a better one. A repair that leaves any fault
-// costs kEnough more.
+// A repair with at most this cost ends the search for a better repair. The cost of a repair that
+// leaves any fault is raised by kEnough.
 constexpr double kEnough = 0.15;
 constexpr double kWhole = 2.0;   // mm around a fault in which the motion is undone completely
 constexpr double kNarrow = 5.0;  // mm, the radius tried first because it undoes less of the pose
 constexpr std::size_t kRounds = 6;
-// Weights of the goals in the linear system, relative to smoothness: places of vertices, edge
-// vectors, flatness at folds, no displacement.
+// Weights of the goals in the linear system; smoothness has the weight 1. kPlace: places of
+// vertices; kEdge: edge vectors; kEven: flatness at folds; kRest: no displacement.
 constexpr double kPlace = 1.0, kEdge = 1.0, kEven = 0.5, kRest = 0.002;
-// Goal for the depth of a repaired vertex as a share of the tolerance kDepth, so that the vertex
-// ends well within the tolerance.
+// Goal for the depth of a repaired vertex beyond the allowed depth, as a share of the tolerance
+// SkinChecker::kDepth: the vertex should end well within the tolerance.
 constexpr double kBeyond = 0.5;
 // After a repair, vertices without a fault get back up to the share kKept of their motion. If this
 // causes a fault, the motion that vertices near this fault get back is reduced by the share kLess,
@@ -44,9 +44,9 @@ constexpr float kDeeper = 0.09f, kWider = 1.005f;
 
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Goals for the displacement x, in mm. places: the displacement of a vertex; edges: the difference
-/// of the displacements of an edge's two vertices; even: a displacement of a vertex at a fold that
-/// brings it nearer to the mean of its neighbours.
+/// Goals for the displacement Work::x, in mm. places: vertex -> its displacement; edges: the two
+/// vertices of an edge -> the displacement of the first minus that of the second; even: vertex at a
+/// fold -> a displacement that brings it nearer to the mean of its neighbours.
 struct Asked {
   std::map<std::uint32_t, Vec3> places;
   std::map<std::array<std::uint32_t, 2>, Vec3> edges;
@@ -59,8 +59,8 @@ struct Work {
   const Placed& pose;
   const SolidSurfaces& solids;
   SkinFaults allowed;
-  // The largest depth in mm and the largest stretch in the pose before the repair, allowed faults
-  // included. `widest` is at least kStretch.
+  // The largest depth in mm and the largest stretch of the pose before the repair; allowed faults
+  // count too. `widest` is at least SkinChecker::kStretch.
   float deepest = 0.0f, widest = 0.0f;
   std::vector<std::uint32_t> active;  // vertices that may move
   std::vector<std::uint32_t> place;   // [V] index in active, or kStill
@@ -187,8 +187,9 @@ Vec3 beside(const Topology& topology, const std::vector<Vec3>& positions, std::u
   return out;
 }
 
-/// Opens a fold: each vertex is drawn towards the mean of its neighbours. The goal for its distance
-/// from the mean is half of the smaller of its neutral and its present distance.
+/// Sets goals that open folds: each vertex of the two faces is drawn towards the mean of its
+/// neighbours. The goal for its distance from this mean is half of its neutral or of its present
+/// distance, whichever is smaller.
 void ask_folded(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t h = 0; h < topology.hinges.size(); ++h) {
@@ -254,10 +255,10 @@ void solve(Work& work, const std::vector<Vec3>& base) {
   for (const std::uint32_t v : work.active) work.x[v] = base[v] + found.row(at(v)).transpose();
 }
 
-/// Whether a repair worsens neither a sum of faults nor, beyond small tolerances, the deepest
-/// vertex and the most stretched face of the skin. The sums leave out allowed faults, which are the
-/// faults that one part of the pose has alone. Without the limits on depth and stretch, undoing
-/// another part could bring these faults into the pose.
+/// Whether a repair worsens no sum of faults, and worsens the deepest vertex and the most stretched
+/// face of the skin by no more than small tolerances. The sums leave out the allowed faults, which
+/// one part of the pose has alone. Without the limits on depth and stretch, undoing another part
+/// could bring these faults into the pose.
 bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
   const FaultSums& a = now.sums;
   return a.volume <= before.volume && a.deepest <= before.deepest + 0.01 &&
@@ -267,8 +268,8 @@ bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
          std::ranges::max(now.faults.stretch) <= kWider * work.widest;
 }
 
-/// The share of the faults that a repair leaves, added up over volume, stretched faces and folded
-/// edges; 0 if no fault is left.
+/// The sum of three shares of the faults before a repair that are left after it: of the volume, of
+/// the stretched faces and of the folded edges. 0 if no fault is left, at most 3 without repair.
 double share_left(const FaultSums& now, const FaultSums& before) {
   double out = before.volume > 0.0 ? now.volume / before.volume : 0.0;
   if (before.stretched > 0) out += double(now.stretched) / double(before.stretched);
@@ -285,13 +286,14 @@ double fading(double distance, double reach) {
   return 1.0 - t * t * (3.0 - 2.0 * t);
 }
 
-/// The cheapest repair so far. Faults that are left and motion that is undone add to the cost.
+/// The cheapest repair so far: displacement x, its sums of faults, the share of faults that it
+/// leaves, and its cost. Faults that are left and motion that is undone add to the cost.
 struct Best {
   std::vector<Vec3> x;
   FaultSums sums;
   double left = 0.0, cost = 0.0;
-  // The cheapest displacement, even if it makes some faults worse: removing these faults from it
-  // may give the best result.
+  // The cheapest displacement of all, even if it makes some faults worse. If these faults can be
+  // removed afterwards, it may give the best repair.
   std::vector<Vec3> any;
   double any_cost = 0.0;
 
@@ -320,7 +322,7 @@ struct Best {
 /// kFades rounds are done.
 /// In:     undo   [V] the displacement in mm that undoes the part everywhere
 ///         reach  mm: vertices at least this far from every fault keep their whole motion
-/// In/out: best   gets the displacement of a round that is cheaper
+/// In/out: best   gets the displacement of a round if it is cheaper than the best one so far
 void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {
   const auto& neutral = work.topology.neutral;
   std::map<std::uint32_t, double> seeds;
@@ -347,7 +349,8 @@ void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double r
 
 /// The displacements that undo parts of the pose: at each vertex a mix that prefers the parts that
 /// move it least, so that the main motion remains; each part alone; the mean of all parts.
-/// In: without  the positions of the skin without each of the parts
+/// In: without  [parts][V] mm, the positions of the skin without each of the parts
+/// Out: [parts + 2][V] mm: the mix, each part, the mean
 std::vector<std::vector<Vec3>> ways_back(const Placed& pose,
                                          const std::vector<std::vector<Vec3>>& without) {
   const std::size_t count = pose.skin.size();
@@ -368,7 +371,9 @@ std::vector<std::vector<Vec3>> ways_back(const Placed& pose,
 }
 
 /// Removes the remaining faults by rounds of least squares solves.
-/// In: base  the displacement to start from
+/// In:     first  the check of the pose before the repair
+///         base   [V] mm, the displacement to start from
+/// In/out: best   gets the displacement of a round if it is cheaper than the best one so far
 void polish(Work& work, const Look& first, const std::vector<Vec3>& base, Best& best) {
   work.x = base;
   work.asked = {};
@@ -384,9 +389,10 @@ void polish(Work& work, const Look& first, const std::vector<Vec3>& base, Best& 
   }
 }
 
-/// The displacement that brings each vertex without a fault back to the share kKept of its motion.
-/// In: x  [V] the displacements of the repair
-/// Out: [V], 0 for a vertex that keeps enough motion
+/// The displacement that gives each vertex without a fault the share kKept of its motion again.
+/// In: faults  vertices with a fault before the repair, sorted
+///     x       [V] mm, the displacements of the repair
+/// Out: [V] mm, 0 for a vertex that keeps enough motion
 std::vector<Vec3> lacking(const Work& work, const std::vector<std::uint32_t>& faults,
                           const std::vector<Vec3>& x) {
   std::vector<Vec3> out(x.size(), Vec3::Zero());
@@ -399,8 +405,8 @@ std::vector<Vec3> lacking(const Work& work, const std::vector<std::uint32_t>& fa
   return out;
 }
 
-/// A corrective should undo nothing at vertices without a fault. The undoing that fades out around
-/// a fault is taken back at these vertices, unless that causes a new fault.
+/// Gives vertices without a fault their motion back. A repair undoes motion around each fault, also
+/// at vertices that had no fault; there it is restored, unless that causes a new fault.
 void give_back(Work& work, const Look& first, const std::vector<std::uint32_t>& faults,
                Best& best) {
   const Topology& topology = work.topology;
@@ -425,7 +431,9 @@ void give_back(Work& work, const Look& first, const std::vector<std::uint32_t>& 
   }
 }
 
-/// The best repair that fading and least squares solves find, checked only in the work's region.
+/// The best repair that fading and least squares solves find. Its faults are searched only in
+/// work.region.
+/// In: ways  [ways][V] mm, displacements that undo parts of the pose
 /// Out: x is empty if no repair helps
 Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& faults,
           const std::vector<std::vector<Vec3>>& ways) {
@@ -446,8 +454,8 @@ Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& fault
   return best;
 }
 
-/// Whether the best repair makes nothing worse in the whole skin. A full check is needed because
-/// the moved vertices may enter skin outside the region.
+/// Whether the best repair makes nothing worse in the whole skin. The whole skin is checked because
+/// the moved vertices may enter skin outside of work.region.
 /// In:     allowed    the faults that the caller allows
 /// In/out: best.sums  if true: the faults beyond `allowed` after the repair
 bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best) {

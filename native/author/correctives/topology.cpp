@@ -16,7 +16,7 @@ namespace {
 constexpr double kReach = 6.0;      // mm: a vertex deeper in a solid is inside for another reason
 constexpr double kSkinReach = 4.0;  // mm, of the skin in itself
 constexpr double kOpposed = -0.2;   // cosine: surfaces below it face each other
-// In mm: a vertex less than 0.2 mm behind a surface still counts as in front of the surface.
+// mm: a vertex that is less than 0.2 mm behind a surface still counts as in front of this surface.
 constexpr double kInFront = -0.2;
 constexpr std::size_t kWays = 128;  // directions from which light may come
 constexpr std::ptrdiff_t kLit = 6;  // open directions that make a vertex lit
@@ -87,8 +87,8 @@ void find_around(Topology& out) {
   }
 }
 
-/// Finds the vertices that light reaches in the neutral pose, and the rim of lips and lids around
-/// them.
+/// Sets out.shown: the vertices that light reaches in the neutral pose, and the vertices at most
+/// kRim edges from them, which are the rims of lips and lids.
 void find_shown(Topology& out) {
   std::vector<Vec3> ways;  // spread evenly (Fibonacci)
   for (std::size_t i = 0; i < kWays; ++i) {
@@ -139,8 +139,8 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
           hit->share[static_cast<Eigen::Index>(k)] * normals[solid.triangles[hit->triangle][k]];
     }
     if ((p - hit->point).dot(normal) >= 0.0) continue;
-    // The vertex leaves the solid towards the nearest point of its surface. At distance 0 this
-    // direction is undefined, and the normal replaces it.
+    // The vertex has to leave the solid towards the nearest point of the solid's surface. At
+    // distance 0 this direction is undefined, so the normal of the surface replaces it.
     const Vec3 out = hit->point - p;
     keep_deeper(best, {v,
                        static_cast<float>(hit->distance),
@@ -151,9 +151,9 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
   }
 }
 
-/// Finds contacts of the skin with itself: upper and lower lip, upper and lower lid. A triangle
-/// behind which the vertex lies in the neutral pose already is left out, because the skin is thin
-/// there.
+/// Finds contacts of the skin with itself, for example of the upper lip with the lower lip. A
+/// triangle is left out if the vertex is behind it in the neutral pose already, because the skin is
+/// thin there.
 void touch_skin(const Topology& topology, const Region& region, const std::vector<Vec3>& skin,
                 std::vector<Contact>& best) {
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);

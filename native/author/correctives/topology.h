@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A skin and everything that is computed from it once. Private to native/author.
+// A skin with the data that are computed from it only once, for all poses. Private to
+// native/author.
 #pragma once
 
 #include <Eigen/Core>
@@ -61,7 +62,7 @@ struct Placed {
   std::vector<std::vector<Vec3>> solids;
 };
 
-/// The solids of a pose with a search tree each. The trees refer to topology and pose, so that both
+/// The solids of a pose, each with a search tree. The trees refer to `topology` and `pose`; both
 /// must outlive this object.
 class SolidSurfaces {
  public:
@@ -72,8 +73,9 @@ class SolidSurfaces {
 
 /// The region of all vertices that can be seen, and all triangles.
 Region whole_region(const Topology& topology);
-/// The region of those of the vertices that can be seen, and of the triangles with a corner, in the
-/// pose, at most 12 mm outside of the bounding box of the vertices.
+/// The region around vertices: those of the vertices that can be seen, and the triangles with a
+/// corner in the bounding box of the vertices or at most 12 mm outside of it. Box and corners are
+/// in the pose.
 Region region_around(const Topology& topology, const Placed& pose,
                      const std::vector<std::uint32_t>& vertices);
 
@@ -91,18 +93,20 @@ SkinFaults find_faults(const Topology& topology, const std::vector<Vec3>& skin,
 
 FaultSums sum_faults(const Topology& topology, const SkinFaults& faults, const SkinFaults& allowed);
 
-/// Whether vertex v is more than kDepth deeper than allowed.
+/// Whether vertex v is deeper than allowed by more than SkinChecker::kDepth.
 inline bool is_deep(const SkinFaults& f, const SkinFaults& allowed, std::size_t v) {
   return f.depth[v] > allowed.depth[v] + SkinChecker::kDepth;
 }
-/// Whether a face of visible size is stretched more than kStretch and more than allowed.
+/// Whether a face is large enough to be seen, and is stretched more than SkinChecker::kStretch and
+/// more than allowed.
 inline bool is_stretched(const Topology& t, const SkinFaults& f, const SkinFaults& allowed,
                          std::size_t face) {
   constexpr double kSmallest = 0.5;  // mm2: a smaller face cannot be seen
   return f.stretch[face] > SkinChecker::kStretch && f.stretch[face] > allowed.stretch[face] &&
          t.face_areas[face] > kSmallest;
 }
-/// Whether the two faces at an edge lie on each other (below kFold), but not in `allowed`.
+/// Whether the two faces at an edge lie on each other (the cosine between their normals is below
+/// SkinChecker::kFold) in `f`, but not in `allowed`.
 inline bool is_folded(const SkinFaults& f, const SkinFaults& allowed, std::size_t hinge) {
   return f.fold[hinge] < SkinChecker::kFold && allowed.fold[hinge] >= SkinChecker::kFold;
 }

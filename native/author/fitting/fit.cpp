@@ -26,20 +26,22 @@ using detail::Vec3;
 
 constexpr int kRoundsOfWeights = 12;
 constexpr std::size_t kRoundsOfMotions = 8;  // Gauss-Newton steps
-// Two steps: a joint leaves an expression in which it moves every vertex by less than
-// FitOptions::least_effect times this factor. There are two, so that other joints take over before
-// more joints leave.
+// Factors of FitOptions::least_effect in two steps of thin_out. In each step, a joint leaves an
+// expression in which it moves every vertex by less than the factor times least_effect. There are
+// two steps, so that other joints take over before more joints leave.
 constexpr double kThinning[] = {0.5, 1.0};
-/// In the last rounds, joints are placed at their pivots and momentum is 0, so that its overshoot
-/// is corrected. In earlier rounds a joint is in the middle of its vertices (with `bound` only in
-/// the first half of the rounds), because a rotation about a far pivot is solved less exactly.
+/// In this number of last rounds, joints are placed at their pivots, and momentum is 0 so that the
+/// overshoot of earlier rounds is corrected. In earlier rounds a joint is in the middle of its
+/// vertices (with FitOptions::bound only in the first half of the rounds), because a rotation about
+/// a far pivot is solved less exactly.
 constexpr std::size_t kLastRounds = 4;
 constexpr double kMomentum = 0.6;
-/// How many of the nearest joints a vertex tries when joints cannot move. The joints it needs may
-/// be further away than its neighbours' joints.
+/// Number of the nearest joints that a vertex tries in fit_weights, in which joints do not move. A
+/// vertex may need joints that are further away than the joints of its neighbours.
 constexpr std::size_t kNearOfGiven = 12;
-/// [V] the square of each vertex's largest error in any expression, weighted by the caller's
-/// importance.
+/// [V] the square of each vertex's largest error in any expression, times the importance that the
+/// caller gives to the vertex.
+/// In: left  the residual of find_residual
 std::vector<double> worst_squares(const Problem& problem, const std::vector<float>& left) {
   std::vector<double> out(problem.vertices);
   for (std::size_t v = 0; v < problem.vertices; ++v) {
@@ -54,7 +56,8 @@ std::vector<double> worst_squares(const Problem& problem, const std::vector<floa
   return out;
 }
 
-/// Raises the importance of vertices whose largest error is above average, and lowers the others'.
+/// Raises the importance of vertices whose largest error is above the mean, and lowers the
+/// importance of the other vertices.
 /// In: power  FitOptions::emphasis; 0: importance stays as it is
 void emphasise(Problem& problem, const std::vector<float>& left, double power) {
   if (power <= 0.0) return;
@@ -103,7 +106,8 @@ Fit pack(const Problem& problem, const State& state, std::size_t expressions) {
   return out;
 }
 
-/// The total numbers of joints after each step of adding joints; the last one is `joints`.
+/// Joints are added in several steps: the total number of joints after each step. The last number
+/// is `joints`.
 std::vector<std::size_t> stages(std::size_t joints) {
   std::vector<std::size_t> out{joints};
   while (out.back() > 30) out.push_back(out.back() * 2 / 3);
@@ -131,7 +135,7 @@ void improve(const Problem& problem, State& state, std::vector<float>& left) {
   detail::find_residual(problem, state, left);
 }
 
-/// The sum of squared residuals. All vertices have the same weight.
+/// The sum of squared residuals, in which all vertices have the same weight.
 double squares(const std::vector<float>& left) {
   double sum = 0.0;
   for (const float x : left) sum += double{x} * double{x};

@@ -31,8 +31,8 @@ std::vector<double> errors(const Problem& problem, const std::vector<float>& lef
   return out;
 }
 
-/// The mean distance between neighbouring joints, as a share of the mesh's size, if all joints were
-/// spread evenly over the moving vertices.
+/// The distance between neighbouring joints, as a share of the mesh's size, if `joints` joints were
+/// spread evenly over the part of the surface that moves.
 double spacing(const Problem& problem, std::size_t joints) {
   double moving = 0.0;
   const double most = *std::max_element(problem.motion.begin(), problem.motion.end());
@@ -51,8 +51,8 @@ Joint make_joint(const Problem& problem, const Vec3& position, std::uint32_t mir
   return out;
 }
 
-/// Gives a new joint a weight of the vertices around it: 0.7 at the joint, falling to 0 at the
-/// distance `reach`. The other weights of a vertex are scaled to the rest of its sum.
+/// Gives the vertices around a new joint weights of this joint: 0.7 at the joint, falling to 0 at
+/// the distance `reach`. The other weights of a vertex are scaled so that the sum stays 1.
 void take_weights(const Problem& problem, State& state, std::uint32_t joint, double reach) {
   const Vec3& centre = state.joints[joint].position;
   for (std::size_t v = 0; v < problem.vertices; ++v) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Motions of all joints for given weights. One sparse system serves all expressions, because joints
-// turn little. Its right side is exact, so that the iteration ends at the optimum of turned joints.
+// turn little. Its right side takes the present rotations into account exactly, so that the
+// iteration ends at the optimum although the matrix ignores them.
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
@@ -18,8 +19,9 @@ namespace {
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
-/// Work is split into this many ranges, because costs differ: given joints cost nothing, an
-/// expression that rotates joints far costs as much as ten others.
+/// Number of ranges into which the work is split for the threads. Costs of joints and expressions
+/// differ: a given joint costs nothing, and an expression that rotates joints far costs as much as
+/// ten others.
 constexpr std::size_t kRanges = 16;
 constexpr double kFar = 0.25;  // radians: from this angle on, the turned arms are used
 // Regularisation of rotations (kTurn) and of translations (kShift), as shares of the joints' mean
@@ -27,8 +29,8 @@ constexpr double kFar = 0.25;  // radians: from this angle on, the turned arms a
 // to 10 were tried on a head with 52 expressions and on four other heads.
 constexpr double kTurn = 0.03;
 constexpr double kShift = 3e-3;
-// Conjugate gradients stop when their residual energy falls to this share of its first value; at
-// 1e-2 some rounds worsened the fit.
+// Conjugate gradients stop when their residual energy falls to this share of its first value. With
+// a share of 1e-2, some rounds made the fit worse.
 constexpr double kEnough = 1e-6;
 constexpr double kTurnAtPivot = 0.01;  // at a pivot a joint should turn and not shift
 constexpr double kShiftAtPivot = 0.01;
@@ -39,8 +41,8 @@ Mat3 cross_matrix(const Vec3& a) {
   return m;
 }
 
-/// Sums of s, s v, s v v^T over the vertices v that two joints share. s is a vertex's importance
-/// times its weights of both joints.
+/// Sums of s, s v and s v v^T over the vertices v that two joints share. s is the importance of the
+/// vertex times its weight of one joint times its weight of the other.
 struct Moments {
   double zeroth = 0.0;
   Vec3 first = Vec3::Zero();
@@ -53,8 +55,8 @@ struct Moments {
   }
 };
 
-/// Sums over the vertices v that two joints share, with arms p = v - a and q = v - b from the
-/// joints' positions a and b.
+/// Sums over the vertices v that two joints share, weighted as in Moments. The arms p = v - a and
+/// q = v - b go from the positions a and b of the two joints.
 struct Shared {
   int column = 0;  // of the other joint
   std::uint32_t joint = 0;
@@ -157,8 +159,8 @@ class System {
     for (std::size_t j = 0; j < rows_.size(); ++j) {
       for (const Shared& s : rows_[j]) {
         if (s.joint != j) continue;
-        // The mean stiffness is computed about the middle of the vertices: the long arms from a far
-        // pivot would make it too large.
+        // The mean stiffness is computed about the middle of each joint's vertices: with the long
+        // arms from a far pivot it would be too large.
         const Vec3 off = state.joints[j].place - state.joints[j].position;
         const double own = s.qp.trace() - 2.0 * off.dot(s.p) + off.squaredNorm() * s.mass;
         turn_ += 2.0 / 3.0 * own / std::max(1, n);
@@ -177,10 +179,10 @@ class System {
   }
   const Factor& at_rest() const { return solver_; }
 
-  /// The lower half of the stiffness matrix of some joints in their present rotations, as a dense
+  /// The lower half of the stiffness matrix of chosen joints in their present rotations, as a dense
   /// matrix.
-  /// In: at           [joints] the joint's index among these joints, ascending, or -1
-  ///     count        number of these joints
+  /// In: at           [joints] a joint's index among the chosen joints, ascending; -1: not chosen
+  ///     count        number of chosen joints
   ///     turn(joint)  the joint's rotation
   template <class Turn>
   Eigen::MatrixXd among(const std::vector<int>& at, int count, const Turn& turn) const {
@@ -196,8 +198,8 @@ class System {
     return out;
   }
 
-  /// The stiffness matrix of all joints in their present rotations. In: turn(joint)  the joint's
-  /// rotation
+  /// The lower half of the stiffness matrix of all joints that are not given, in their present
+  /// rotations. In: turn(joint)  the joint's rotation
   template <class Turn>
   Sparse matrix(const Turn& turn) const {
     std::vector<Eigen::Triplet<double>> entries;
@@ -226,14 +228,15 @@ class System {
   Factor solver_;
 };
 
-/// The torque and the force of the residual on a joint in each expression.
+/// Computes the torque and the force of the residual on a joint in each expression.
+/// Out: out  [E] torque, force
 void gradient(const Problem& problem, const Joint& joint,
               const std::vector<ByJoint::Entry>& weights, const std::vector<float>& left,
               std::vector<Vec6>& out) {
   const std::size_t count = problem.expressions;
-  // Sums of r and of (v - c) r^T over the joint's vertices v, with residual r and joint position c.
-  // The torque of the rotated arm follows from the second sum. For each axis of r there are four
-  // rows of all expressions: the three axes of v - c, then r.
+  // Sums of r and of (v - c) r^T over the joint's vertices v, with the residual r of the vertex and
+  // the joint's position c. The torque follows from the second sum. For each axis of r there are
+  // four rows of all expressions: r times each axis of v - c, then r alone.
   std::vector<float> sums(12 * count, 0.0f);
   for (const auto& entry : weights) {
     const double s = problem.importance[entry.vertex] * entry.weight;
@@ -287,8 +290,8 @@ void update_motion(Joint& joint, std::size_t e) {
 
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left) {
   const std::size_t count = problem.expressions, joints = state.joints.size();
-  // [J][12][E] the matrices of the joints' motions: for each number of the matrix a row of all
-  // expressions.
+  // [J][12][E] the matrices of the joints' motions: for each of the 12 numbers of a matrix, a row
+  // with the values in all expressions.
   std::vector<float> motions(joints * 12 * count);
   for (std::size_t j = 0; j < joints; ++j) {
     if (state.joints[j].rests) continue;
@@ -321,7 +324,8 @@ void find_residual(const Problem& problem, const State& state, std::vector<float
 
 namespace {
 
-/// [E] the squared residuals of each expression, summed over vertices weighted by importance.
+/// [E] the sum of the squared residuals of each expression over all vertices, each times the
+/// importance of its vertex.
 std::vector<double> energies(const Problem& problem, const std::vector<float>& left) {
   const std::size_t count = problem.expressions;
   std::vector<double> out(count);
@@ -336,9 +340,10 @@ std::vector<double> energies(const Problem& problem, const std::vector<float>& l
   return out;
 }
 
-/// Takes the step in each expression, and shortens it in expressions whose error grows.
+/// Changes the joints' motions by the step in each expression. In an expression whose error would
+/// grow, the step is shortened, at last to 0.
 /// In:  step  [6 * columns, E] rotation vector and translation of each joint that is not given
-/// Out: left  the new residual
+/// In/out: left  the residual before and after the step
 void take_step(const Problem& problem, State& state, const System& system,
                const Eigen::MatrixXd& step, std::vector<float>& left) {
   const std::size_t count = problem.expressions;
@@ -379,7 +384,8 @@ void take_step(const Problem& problem, State& state, const System& system,
   }
 }
 
-/// The step of expression e, in which some joints take no part; the step of these joints is 0.
+/// The step of all joints in expression e, in which some joints take no part; the step of these
+/// joints is 0.
 /// In: right  [6 * columns] torque and force on each joint that is not given
 Eigen::VectorXd solve_few(const State& state, const System& system, std::size_t e,
                           const Eigen::VectorXd& right) {
@@ -401,9 +407,10 @@ Eigen::VectorXd solve_few(const State& state, const System& system, std::size_t 
   return out;
 }
 
-/// The step of an expression that rotates joints far, by conjugate gradients on the stiffness in
-/// their present rotations. The preconditioner is the stiffness in the neutral pose, applied in the
-/// joints' rotated axes: it is exact if neighbouring joints have equal rotations.
+/// The step of all joints in expression e, which rotates joints far: conjugate gradients solve the
+/// system with the stiffness in the present rotations. The preconditioner is the stiffness in the
+/// neutral pose, applied in the joints' rotated axes: it is exact if joints that share vertices
+/// have equal rotations.
 Eigen::VectorXd solve_turned(const State& state, const System& system, std::size_t e,
                              const Eigen::VectorXd& right) {
   const Sparse matrix = system.matrix([&](std::size_t j) { return state.joints[j].rotations[e]; });

@@ -10,7 +10,9 @@ namespace risorius::author::detail {
 
 namespace {
 
-/// The squared distance by which a joint moves a vertex. In: p  the vertex times its weight
+/// The squared length of the part of a vertex's displacement that comes from a joint.
+/// In: p       the vertex's neutral position times the weight
+///     weight  the vertex's weight of the joint
 double moved_square(const Affine& motion, const Vec3& p, double weight) {
   return (motion.leftCols<3>() * p + weight * motion.col(3)).squaredNorm();
 }
@@ -40,7 +42,7 @@ void leave_expressions(const Problem& problem, State& state, double least) {
     if (joint.given) continue;
     joint.idle.resize(count);
     for (std::size_t e = 0; e < count; ++e) {
-      // A joint and its mirror leave the expression together.
+      // A joint leaves an expression only if its mirrored joint leaves the mirrored expression.
       const bool also = other.empty() || small[joint.mirrored][other[e]];
       if (!small[j][e] || !also) continue;
       joint.idle[e] = true;
@@ -83,7 +85,8 @@ int pivot_of(const Problem& problem, const Joint& joint,
   return best;
 }
 
-/// Moves a joint's position and changes its translations so that its vertices move as before.
+/// Changes a joint's neutral position to `to`, and changes its translations so that its vertices
+/// move as before.
 void place_at(const Problem& problem, const Vec3& to, Joint& joint) {
   const Vec3 arm = to - joint.position;
   for (std::size_t e = 0; e < problem.expressions; ++e) {

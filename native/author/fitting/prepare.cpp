@@ -15,8 +15,8 @@ namespace {
 
 using core::ErrorCode;
 
-/// The smoothness that gives weights as smooth as Dem Bones' default, as a share of the vertices'
-/// mean squared motion.
+/// The smoothness with which weights are as smooth as the weights of the program Dem Bones with its
+/// default options. It is a share of the vertices' mean squared motion.
 constexpr double kSmoothness = 0.18;
 
 void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
@@ -138,8 +138,9 @@ void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
                 std::vector<Joint>& joints, std::size_t own) {
   if (problem.mirror.empty()) return;
   const Mat3 flip = Vec3(-1, 1, 1).asDiagonal();
-  // Several joints may have the same position, such as the joints of a lid in the middle of the
-  // eye. The pairs are then found by comparing motions. A joint mirrors at most one other joint.
+  // Several joints may have the same position: for example, all joints of an eye's lids are at the
+  // middle of the eye. So pairs are found by comparing motions, too. A joint is the mirror of at
+  // most one other joint.
   std::vector<bool> taken(joints.size(), false);
   for (std::uint32_t j = 0; j < joints.size(); ++j) {
     taken[j] = j < given.size() && given[j].mirrored != GivenJoint::kUnknown;
@@ -229,7 +230,8 @@ void take_pivots(const std::vector<Pivot>& pivots, Problem& problem) {
       problem.pivots[i].mirrored = k;
       problem.pivots[k].mirrored = i;
     }
-    // A pivot that has no mirrored pivot and is near the plane x = 0 is moved into this plane.
+    // A pivot without a pivot on the other side that is near the plane x = 0 is moved into this
+    // plane, so that it is its own mirror.
     if (problem.pivots[i].mirrored == i && std::abs(problem.pivots[i].position.x()) < 0.02) {
       problem.pivots[i].position.x() = 0.0;
     }

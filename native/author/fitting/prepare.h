@@ -14,12 +14,15 @@ namespace risorius::author::detail {
 /// Fails: as fit_joints
 core::Status check(const Shapes& shapes, const FitOptions& options);
 
-/// The problem without its pivots. In: shapes, options  must have been checked
+/// The problem without its pivots, which take_pivots adds. In: shapes, options  must have passed
+/// `check`
 Problem make_problem(const Shapes& shapes, const FitOptions& options);
-/// Adds the pivots, converted to the fit's unit, and pairs each with the pivot of the other side.
+/// Adds pivots to the problem, converted to the fit's unit, and pairs each pivot with the pivot on
+/// the other side of the face.
 void take_pivots(const std::vector<Pivot>& pivots, Problem& problem);
-/// The state with the given joints. If all of them move, a joint without motion, the head, is
-/// added. The first joint without motion gets all vertices. Also fills problem.nearest_given.
+/// The first state: the given joints, and the head, a joint without motion, if all given joints
+/// move. The first joint without motion gets the whole weight of all vertices. Also fills
+/// problem.nearest_given.
 /// In: own  number of expressions without the added mirrored ones
 State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t own);
 /// Sets the initial weights of the vertices; weights without influences change nothing.

@@ -22,8 +22,8 @@ struct Problem {
   Vec3 middle = Vec3::Zero();
   double scale = 1.0;           // from the input's unit to the fit's
   std::vector<Vec3> positions;  // [V]
-  // [V][3][E], because most loops go over all expressions of one axis. Added mirrored expressions
-  // are at the end.
+  // [V][3][E] displacements of the vertices. The expressions are the innermost index, because most
+  // loops go over all expressions for one axis. Added mirrored expressions are the last ones.
   std::vector<float> displacements;
   std::vector<std::uint32_t> first_neighbour, neighbours;  // of vertices, as rows of a CSR matrix
   std::vector<double> motion;  // [V] root of the summed squares of its displacements
@@ -37,8 +37,8 @@ struct Problem {
   std::vector<Pivot> pivots;
   bool to_pivots = false;  // true: move_joints may place joints at pivots
   double smoothness = 0.0;
-  /// The share of a weight's last change that is added to the weight again, because consecutive
-  /// rounds mostly change it in the same direction.
+  /// The share of a weight's change in the last round by which the weight is changed once more,
+  /// because consecutive rounds mostly change a weight in the same direction.
   double momentum = 0.0;
   std::size_t near = 5;            // joints that a vertex tries because they are near
   std::vector<double> importance;  // [V] weight of a vertex's squared error, mean 1
@@ -62,7 +62,7 @@ struct Joint {
   std::vector<Mat3> rotations;     // [E]
   std::vector<Vec3> translations;  // [E]
   std::vector<Affine> motions;     // [E] computed from the two above
-  // [E] true: the joint takes no part in the expression; empty: it takes part in all.
+  // [E] true: the joint takes no part in the expression; empty: it takes part in all expressions.
   std::vector<bool> idle;
 
   bool is_idle(std::size_t expression) const { return !idle.empty() && idle[expression]; }
@@ -83,7 +83,7 @@ struct State {
 /// The best weights for the present motions, plus momentum if it is set.
 void solve_weights(const Problem& problem, State& state);
 /// The best motions for the present weights.
-/// In/out: left  the residual of find_residual, before and after
+/// In/out: left  the residual of find_residual, for the motions before and after the call
 void solve_motions(const Problem& problem, State& state, std::vector<float>& left);
 /// Removes each joint for good from the expressions in which it moves every vertex by less than
 /// `least`. Given joints stay; a joint and its mirror leave an expression together.
@@ -91,8 +91,8 @@ void leave_expressions(const Problem& problem, State& state, double least);
 /// Computes the displacements that the joints do not reproduce.
 /// Out: left  [V][3][E] the shapes' displacements minus the displacements by the joints
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
-/// Adds joints where the present ones leave the largest error, until there are `count` joints in
-/// all or no vertex has an error and room for a joint.
+/// Adds joints at the vertices at which the present joints leave the largest error. Stops when
+/// there are `count` joints in all, or when each vertex has no error or is too near to a new joint.
 /// In: left  the residual of find_residual
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,
                 std::size_t count);

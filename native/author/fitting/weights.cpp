@@ -20,10 +20,12 @@ constexpr double kLeast = 1e-4;  // smaller weights are dropped
 constexpr double kOwn = 0.4;
 constexpr double kLeastOnward = 0.1;  // share of a weight that momentum leaves at least
 
-// At most kCandidates rows, so that Eigen allocates no memory.
+// Matrices with at most kCandidates rows and columns. Eigen knows this limit, so that it allocates
+// no memory.
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCandidates, kCandidates>;
 using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCandidates, 1>;
-// Of two joints with the motions Y and Z: the symmetric part of Y^T Z, summed over expressions.
+// For two joints with the motions (Affine) Y and Z: the ten coefficients of the quadratic form of
+// the symmetric part of Y^T Z, summed over expressions.
 using Products = std::array<double, 10>;
 
 Products products(const Joint& a, const Joint& b) {
@@ -42,7 +44,7 @@ double at(const Products& m, const Vec3& p) {
          m[8] * p.y() + m[9] * p.z();
 }
 
-/// Products of the motions of each pair of joints that are candidates of the same vertex.
+/// The Products of each pair of joints that are candidates of the same vertex.
 class Pairs {
  public:
   Pairs(const State& state, const std::vector<std::vector<Influence>>& candidates,
@@ -77,7 +79,8 @@ class Pairs {
   std::vector<Products> values_;
 };
 
-/// The joints that a vertex tries, each with the mean weight of the vertex's neighbours.
+/// The joints that a vertex tries, sorted by index. The weight of each is the mean of the weights
+/// that the vertex's neighbours have of this joint.
 std::vector<Influence> candidates_of(const Problem& problem, const State& state, std::size_t v) {
   std::vector<double> mean(state.joints.size(), 0.0), score(state.joints.size(), -1.0);
   std::vector<std::uint32_t> found;
@@ -88,8 +91,8 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
     }
     score[j] += add;
   };
-  // Only the first joint without motion is always a candidate: if all joints without motion were,
-  // they would fill the candidate slots.
+  // Only the first of the joints without motion is always a candidate. If all of them were, no
+  // place would be left among the kCandidates for joints that move.
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
     if (!state.joints[j].rests) continue;
     note(j, 100.0);
@@ -127,9 +130,9 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
 class Simplex {
  public:
   Simplex(Matrix gram, Column right) : gram_(std::move(gram)), right_(std::move(right)) {
-    // The small ridge gives two joints that move alike equal weights, and keeps rounding errors
-    // from making a weight negative. The goal that the weights sum to 1 is a further row of the
-    // least squares, weighted so heavily that the sum is 1 up to rounding.
+    // The small number on the diagonal gives two joints that move alike equal weights, and keeps
+    // rounding errors from making a weight negative. The goal that the weights sum to 1 is a
+    // further row of the least squares, weighted so heavily that the sum is 1 up to rounding.
     gram_.diagonal().array() += 1e-7 * gram_.diagonal().maxCoeff();
     const double heavy = 1e4 * (gram_.diagonal().maxCoeff() + 1e-30);
     gram_.array() += heavy;
@@ -292,8 +295,8 @@ std::vector<Influence> mirrored(const State& state, std::vector<Influence> row) 
   return row;
 }
 
-/// Makes the weights of a vertex in the middle symmetric: the mean of the weights and their mirror,
-/// with at most `count` joints.
+/// Makes the weights of a vertex in the plane x = 0 symmetric. The result is the mean of the
+/// weights and the mirrored weights, with at most `count` joints.
 std::vector<Influence> balanced(const State& state, const std::vector<Influence>& row,
                                 std::size_t count) {
   std::vector<Influence> both = row;
@@ -343,7 +346,10 @@ double weight_of(const std::vector<Influence>& row, std::uint32_t joint) {
   return found == row.end() ? 0.0 : found->weight;
 }
 
-/// Continues a vertex's weights in the direction of their change since the previous round.
+/// Adds momentum to a vertex's weights: changes them further in the direction of their change since
+/// the previous round, and divides them by their sum.
+/// In: before    the weights of the previous round
+///     momentum  the share of the change that is added
 std::vector<Influence> onward(std::vector<Influence> row, const std::vector<Influence>& before,
                               double momentum) {
   double sum = 0.0;
@@ -356,7 +362,8 @@ std::vector<Influence> onward(std::vector<Influence> row, const std::vector<Infl
   return row;
 }
 
-/// Adds momentum to the solved weights (Nesterov 1983), equally on both sides of the mesh.
+/// Adds momentum to the solved weights of all vertices (Nesterov 1983). On a symmetric mesh both
+/// sides get equal weights.
 void go_on(const Problem& problem, State& state, std::vector<std::vector<Influence>> solved) {
   state.weights = solved;
   if (!state.solved.empty()) {

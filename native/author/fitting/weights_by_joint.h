@@ -9,7 +9,8 @@
 
 namespace risorius::author::detail {
 
-/// The weights of all vertices, listed for each joint: of[joint] has the joint's vertices.
+/// The weights of all vertices by joint: of[joint] lists the vertices that have a weight of the
+/// joint, and these weights.
 struct ByJoint {
   struct Entry {
     std::uint32_t vertex;

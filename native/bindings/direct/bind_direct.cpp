@@ -84,8 +84,10 @@ void forget_meshes(PyDirectFace& face) {
   face.face->forget();
 }
 
-// The memory that receives a mesh's vertices. In: value  an array, which `kept` keeps alive, or
-// (address, number of vertices)
+// The memory that receives a mesh's vertices.
+// In: value     a float32 array [vertices, 3], or a tuple (address, number of vertices)
+//     vertices  number of vertices of the mesh
+// Out: kept     gets the array, so that its memory stays alive
 float* target_argument(const py::handle& value, py::ssize_t vertices,
                        std::vector<py::object>& kept) {
   if (!py::isinstance<py::tuple>(value)) {
@@ -109,8 +111,8 @@ float* target_argument(const py::handle& value, py::ssize_t vertices,
   return reinterpret_cast<float*>(address);
 }
 
-/// The arguments of evaluate_faces or deform_faces, and the Python objects that keep their memory
-/// alive.
+/// The arguments of one call of evaluate_faces or deform_faces, and the Python objects whose memory
+/// must stay alive during the call.
 struct Request {
   std::vector<FacePtr> faces;
   std::vector<rig::FaceFrame> frames;
@@ -146,8 +148,8 @@ struct Request {
 
   const rig::FaceParts& parts(std::size_t f) const { return faces[f]->face->parts(); }
 
-  // Adds the memory that receives the vertices of a face's meshes. In: object  {mesh: array or
-  // (address, number of vertices)}
+  // Adds the memory that receives the vertices of the meshes of face f.
+  // In: object  {index of a mesh: array, or (address, number of vertices)}
   void add_targets(std::size_t f, const py::object& object) {
     if (!py::isinstance<py::dict>(object)) {
       throw py::value_error("targets: {mesh: array or (address, vertices)} was expected for each");

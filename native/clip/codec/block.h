@@ -16,15 +16,18 @@ namespace risorius::clip {
 
 inline constexpr std::size_t kMostBlockFrames = 4096;
 
-// The first byte of a block's curves is kCodedBlock or kStoredBlock. The first byte of a curve's
-// chunk is kStoredChunk or the order of its predictor.
+// The first byte of a block's curves is kCodedBlock or kStoredBlock (all values as they are). The
+// first byte of a curve's chunk in a coded block is the order of its predictor, or kStoredChunk if
+// the values follow as they are.
 inline constexpr std::uint8_t kCodedBlock = 0, kStoredBlock = 1, kStoredChunk = 0xFF;
 
-/// How a block describes a curve: all zeros, one constant value, a repetition of an earlier curve,
-/// or a coded chunk. Neighbouring curves with the same constant value share an entry.
+/// How a block describes a curve: kZero, all values are 0; kConstant, one constant value;
+/// kRepeated, equal to an earlier curve of the block; kCoded, a chunk of bytes. Neighbouring curves
+/// with the same constant value share one entry.
 enum class PartKind : std::uint8_t { kZero, kConstant, kRepeated, kCoded };
 
-/// Curves [controls, frames]; the rows begin `stride` values apart.
+/// Curves [controls, frames] in the caller's memory; each row begins `stride` values after the row
+/// before.
 struct BlockCurves {
   const float* values = nullptr;
   std::size_t stride = 0, controls = 0, frames = 0;
@@ -34,8 +37,8 @@ struct BlockCurves {
   }
 };
 
-/// Appends the block's bytes, at most 1 + 4 * controls * frames.
-/// In: 1 to kMostBlockFrames frames
+/// Encodes curves as a block and appends its bytes to `out`, at most 1 + 4 * controls * frames.
+/// In: curves  with 1 to kMostBlockFrames frames
 void encode_curves(const BlockCurves& curves, Bytes& out);
 
 /// The curves of a block. A curve is decoded only when it is requested.

@@ -17,7 +17,8 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-// The meaning of the next bits of a chunk, packed into one word:
+// The entry of a table that is indexed by the next bits of a chunk: the meaning of these bits,
+// packed into one word:
 // bits 0-5    number of bits of the code and its extra bits together
 // bit 6       the symbol repeats the last value; bit 7: no code begins with these bits
 // bits 8-11   length of the code; 16-20: number of extra bits
@@ -40,7 +41,8 @@ constexpr std::size_t kSpare = 8;  // bytes that a load may read past a chunk
 class BitReader {
  public:
   BitReader(const std::uint8_t* bytes, std::size_t size) : bytes_(bytes), end_(8 * size) {}
-  // At least the next 57 bits, the first in the lowest bit; bits behind the end are undefined.
+  // A word with at least the next 57 bits, the first of them in the lowest bit. Bits after the end
+  // of the chunk are undefined.
   std::uint64_t peek() const {
     std::uint64_t word;
     std::memcpy(&word, bytes_ + (at_ >> 3), sizeof word);
@@ -65,7 +67,9 @@ std::uint32_t number_of(std::uint64_t word, Entry entry) {
 template <int kOrder>
 class Lane {
  public:
-  // In: a coded chunk, behind which kSpare bytes are readable
+  // In: tables  the tables of all prefix codes of the block, one after the other
+  //     chunk   a coded chunk; kSpare bytes after its end must be readable
+  //     out     [frames] gets the bits of the values
   Lane(const Entry* tables, View chunk, std::uint32_t* out, std::size_t frames)
       : tables_(tables),
         table_(tables),
@@ -79,7 +83,8 @@ class Lane {
   bool is_whole() const { return bits_.is_at_end(); }
 
   // Decodes the next symbol: a value, or a repetition of the last value. False if no code begins
-  // with these bits, or they go beyond the chunk or its frames.
+  // with the next bits, if the last bits were beyond the chunk, or if the repetition has too many
+  // frames.
   bool step() {
     if (bits_.is_beyond()) [[unlikely]]
       return false;
@@ -209,7 +214,8 @@ core::Status EncodedCurves::read_parts(Cursor& in, std::size_t controls) {
   return core::ok();
 }
 
-// Copies the chunks at the very end of the block, so that spare bytes follow them.
+// Copies the end of the block from the first coded chunk on that has fewer than kSpare bytes after
+// it, and adds kSpare bytes, because decoding may read past a chunk.
 void EncodedCurves::keep_tail() {
   tail_begin_ = bytes_.size();
   for (Part& part : parts_) {

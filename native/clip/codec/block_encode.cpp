@@ -39,7 +39,8 @@ std::vector<Token> tokens_of(std::span<const float> curve) {
   return tokens;
 }
 
-// Estimates the bits of tokens by the entropy of their symbols.
+// Estimates the number of bits of encoded tokens: the entropy of their symbols, and their extra
+// bits.
 double cost_of(const std::vector<Token>& tokens) {
   std::array<std::uint32_t, kMostSymbols> counts{};
   double bits = 0.0;
@@ -75,7 +76,8 @@ Coded best_tokens(std::span<const float> curve) {
 
 // The prefix codes of a block, and the symbols that choose between them.
 struct Codes {
-  // bounds[i] is the largest preceding value symbol of code i + 1; the last code has no bound.
+  // Code i + 1 is used after a value symbol of at most bounds[i] that is above bounds[i - 1]; the
+  // last code after larger symbols; code 0 after a repetition.
   std::vector<std::uint8_t> bounds;
   std::vector<Code> codes;
 

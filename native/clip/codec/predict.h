@@ -19,7 +19,7 @@ inline std::uint32_t in_order(std::uint32_t bits) {
   return bits ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(bits) >> 31) >> 1;
 }
 
-/// All ones if the difference is negative, otherwise 0.
+/// All 32 bits 1 if the difference, read as int32, is negative; otherwise 0.
 inline std::uint32_t sign_of(std::uint32_t difference) {
   return static_cast<std::uint32_t>(static_cast<std::int32_t>(difference) >> 31);
 }
@@ -63,8 +63,8 @@ class History {
   float values_[kOrder + 1] = {};
 };
 
-/// While an object of this class exists, the processor rounds and treats denormals as at the start
-/// of a process, even if the host program has changed that.
+/// While an object of this class exists, the processor rounds to nearest and keeps denormals, as at
+/// the start of a process, even if the program that uses this library has changed these settings.
 class DefaultArithmetic {
  public:
   DefaultArithmetic() {

@@ -39,9 +39,8 @@ struct Token {
 };
 
 /// The token of a value.
-/// In:  error  the value minus the prediction
-///      sign   of the last error that was not 0: 0 or all ones
-/// Out: sign   updated by this error, unless the error is 0
+/// In:     error  the value minus the prediction, both as in_order maps them
+/// In/out: sign   sign of the last error other than 0, as sign_of gives it: 0 or all ones
 inline Token value_token(std::uint32_t error, std::uint32_t& sign) {
   if (error == 0) return {0, 0};
   const std::uint32_t own = sign_of(error), size = (error ^ own) - own;

@@ -24,7 +24,7 @@ class FileWriter {
       const std::filesystem::path& path, Head head, std::size_t block_frames = kDefaultBlockFrames,
       const bytes::FileCalls& calls = bytes::system_file_calls());
 
-  /// Appends frames; a block that became full is written to the .part file.
+  /// Appends frames; each block that becomes full is written to the .part file.
   /// In: frames [n, controls]; times [n] if the clip has them, else empty: seconds, finite, each
   ///     after the one before
   /// Fails: kInvalidArgument (nothing is appended; also after close()), kIoWrite
@@ -49,8 +49,8 @@ class FileWriter {
   Encoder encoder_;
   std::filesystem::path path_, part_;
   std::optional<bytes::NewFile> file_;
-  // The first failed write, which every later call returns: bytes are missing from the file, so
-  // that it would be no valid clip if it were continued.
+  // The error of the first failed write, which every later call returns: bytes are missing from the
+  // file, so that further bytes would not make a valid clip.
   core::Status trouble_ = core::ok();
 };
 

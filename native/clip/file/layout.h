@@ -18,14 +18,15 @@ inline constexpr std::uint32_t kBlockMark = 0x4B4C425A;  // "ZBLK"
 inline constexpr std::uint32_t kIndexMark = 0x5844495A;  // "ZIDX"
 inline constexpr std::uint32_t kEndMark = 0x444E455A;    // "ZEND"
 
-// Bytes at the start of a file: mark (4), version (4), and number of bytes of the head that
-// follows (4).
+// Number of bytes at the start of a file: mark (4 bytes), version (4), and number of bytes of the
+// head that follows (4).
 inline constexpr std::size_t kHeadStart = 12;
-// Bytes of a block's head: mark (4), number of bytes after the head (4), frames (4), first frame
-// (8), and the hash (8) of these fields and of the bytes after the head.
+// Number of bytes of a block's head: mark (4 bytes), number of bytes after the head (4), number of
+// frames (4), index of the first frame (8), and the hash (8) of these fields and of the bytes after
+// the head.
 inline constexpr std::size_t kBlockStart = 28;
-// Bytes of the end of a file: offset of the index (8), size of the index (4), mark (4), and the
-// hash (8) of the index and these fields.
+// Number of bytes of the end of a file: offset of the index (8 bytes), size of the index (4), mark
+// (4), and the hash (8) of the index and these fields.
 inline constexpr std::size_t kEndSize = 24;
 inline constexpr std::size_t kHashSize = 8;
 
@@ -45,7 +46,7 @@ inline void put_events(Bytes& out, const std::vector<Event>& events) {
   }
 }
 
-/// Reads events. Allocates memory only for events that were read, because the count may be wrong.
+/// Reads events. Memory is allocated event by event, because the count in the file may be wrong.
 inline std::vector<Event> get_events(Cursor& in) {
   std::vector<Event> events;
   const std::uint64_t count = in.count();

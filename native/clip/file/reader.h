@@ -19,7 +19,8 @@ struct Limits {
   std::uint64_t frames = std::uint64_t{1} << 32;
   std::uint64_t head_bytes = std::uint64_t{1} << 24;  // also of all decoded names together
   std::uint64_t metadata = std::uint64_t{1} << 18;    // pairs of key and value
-  // In one read: controls * frames; a frame with a time of its own counts as two more controls.
+  // Largest number of values of one read: controls * frames, and two more values for each frame if
+  // frames have times of their own.
   std::uint64_t values = std::uint64_t{1} << 29;
 };
 
@@ -39,8 +40,8 @@ class Reader {
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_; }
   const std::vector<Event>& events() const { return events_; }
-  /// Number of bytes of the file that belong to the clip. Only a file that was cut or damaged has
-  /// more: the bytes from the first incomplete or damaged block on.
+  /// Number of bytes of the file that belong to the clip. Only a cut or damaged file is longer: its
+  /// bytes from the first incomplete or damaged block on do not belong to the clip.
   std::uint64_t byte_count() const { return end_; }
   /// Index of the first frame of each block; the last entry is frame_count().
   const std::vector<std::uint64_t>& block_starts() const { return starts_; }

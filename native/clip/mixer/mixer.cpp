@@ -9,8 +9,8 @@ namespace risorius::clip {
 
 namespace {
 
-// Frame numbers and numbers of repeats that differ from an integer by less than this, relative to
-// the integer's size, are rounded to it.
+// A frame number or a number of repeats is rounded to the nearest integer if it differs from this
+// integer by less than this share of it (absolutely below 1).
 constexpr double kLost = 1e-9;
 
 double snapped(double x) noexcept {
@@ -106,8 +106,8 @@ bool Mixer::moment(const Layer& layer, double time, Moment& out) noexcept {
     out.clip_time = layer.warp.at(t);
   } else {
     const double length = (layer.last - layer.first) * layer.scale;
-    // At the layer's end the number of repeats is not computed from t, because at large times
-    // rounding would make it too small.
+    // At the end of the layer, the number of repeats is layer.repeat and not computed from t,
+    // because at large times rounding could make it too small.
     const double turns =
         t >= layer.end ? layer.repeat : std::min(snapped((t - layer.start) / length), layer.repeat);
     double part = turns - std::floor(turns);

@@ -16,7 +16,7 @@
 
 namespace risorius::clip {
 
-/// Curves in the caller's memory.
+/// The curves of a clip in the caller's memory.
 struct CurvesView {
   std::span<const std::string> names;
   std::span<const float> values;  // [names, frames]
@@ -42,20 +42,20 @@ enum class Extend : std::uint8_t {
   kRepeat,  // repeated before the start and after the end
 };
 
-/// A polyline y(x). Before its first and after its last point it is constant. One point is a
-/// constant.
+/// A polyline y(x), constant before its first and after its last point. A line with one point is
+/// constant everywhere.
 struct Line {
   std::vector<double> x, y;  // x ascending
   double at(double x) const noexcept;
 };
 
 /// The curves of a layer, prepared for playing: values frame by frame, controls in the mixer's
-/// order, and constant curves separate. Curves that the mixer has no control for, or whose mask is
-/// 0, are left out. Immutable, so that several layers and mixers can share one object.
+/// order, and constant curves separate. Curves for which the mixer has no control, or whose mask is
+/// 0, are left out. An object never changes, so that several layers and mixers can share it.
 class LayerCurves {
  public:
   /// In:    controls  the names of the mixer's controls
-  ///        curves    copied
+  ///        curves    the curves of the layer, which are copied
   ///        mask      float[controls] in [0, 1], or empty: all 1
   /// Fails: kInvalidLength, kInvalidValue, with the field
   static core::Result<std::shared_ptr<const LayerCurves>> make(
@@ -113,8 +113,9 @@ struct Layer {
   bool mute = false, solo = false;
 };
 
-/// Part of a reaction: controls that share one envelope. During `attack` it rises and during
-/// `release` it falls along x * x * (3 - 2 * x), where x goes from 0 to 1 and back.
+/// Part of a reaction: controls that share one envelope, a factor from 0 to 1. During `attack` the
+/// envelope rises, and during `release` it falls, along x * x * (3 - 2 * x), where x goes from 0 to
+/// 1 and back.
 struct ReactionPart {
   std::vector<std::uint32_t> controls;
   std::vector<float> weights;                                   // [controls], in [0, 1]

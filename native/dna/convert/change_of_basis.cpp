@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Converts vectors and Euler angles between coordinate systems, in double, for row vectors.
+// Converts vectors and Euler angles between coordinate systems, in double. Vectors are rows.
 #include "dna/convert/change_of_basis.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ std::array<std::size_t, 3> axis_order(std::uint32_t sequence) {
   return kOrders[sequence];
 }
 
-// Multiplies R from the right by the matrix, for row vectors, of a rotation about one axis.
+// Replaces r by r times the matrix of a rotation about one axis (the matrix for row vectors).
 // In: angle  radians
 void rotate(Matrix& r, std::size_t axis, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
@@ -30,7 +30,7 @@ void rotate(Matrix& r, std::size_t axis, double angle) {
   }
 }
 
-// transpose(C) R C
+// The rotation r in the target axes: transpose(C) R C, where C is the matrix of the basis.
 Matrix conjugated(const Basis& basis, const Matrix& r) {
   Matrix out{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -41,8 +41,9 @@ Matrix conjugated(const Basis& basis, const Matrix& r) {
   return out;
 }
 
-// The angles, in radians, of R = Ri Rj Rk. The middle angle is computed from both its sine and its
-// cosine, because asin alone loses half of the digits near gimbal lock.
+// The angles, in radians, of the rotation r = Ri Rj Rk about the axes i j k of `order`. The middle
+// angle is computed from both its sine and its cosine, because asin alone loses half of the digits
+// near gimbal lock.
 Vec3 angles_of(const Matrix& r, const std::array<std::size_t, 3>& order) {
   const auto [i, j, k] = order;
   const double parity = j == (i + 1) % 3 ? 1.0 : -1.0;
@@ -107,7 +108,8 @@ Rotation::Rotation(const System& source, const System& target, const Basis& basi
     same_order_ = same_order_ && basis.to[from_[i]] == into_[i];
     to_radians_[i] = in * source.ext.rotation_sign[i];
     from_radians_[j] = target.ext.rotation_sign[j] / out;
-    // If the basis mirrors, a rotation about an axis that keeps its direction reverses its sense.
+    // If one system is the mirror image of the other (determinant -1), a rotation about an axis
+    // that keeps its direction reverses its sense.
     factor_[i] = basis.determinant * basis.sign[i] * source.ext.rotation_sign[i] *
                  target.ext.rotation_sign[j] * unit_;
   }

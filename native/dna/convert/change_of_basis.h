@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Converts vectors and Euler angles from one coordinate system to another, in double. Row vectors
-// throughout: v' = v C and R' = transpose(C) R C, where C is a signed permutation.
+// Converts vectors and Euler angles from one coordinate system to another, in double. Vectors are
+// rows: v' = v C and R' = transpose(C) R C, where C is a signed permutation.
 #pragma once
 
 #include <array>
@@ -47,15 +47,15 @@ class Rotation {
   /// and unit.
   bool same_order() const { return same_order_; }
   bool identity() const { return same_order_ && basis_.identity() && factor_ == Vec3{1, 1, 1}; }
-  /// The factor of an angle about a source axis. It holds for any rotation with same_order,
-  /// otherwise only for rotations about a single axis.
+  /// The factor by which an angle about a source axis is multiplied. If same_order() is true it
+  /// holds for any rotation, otherwise only for rotations about a single axis.
   double factor(std::size_t source_axis) const { return factor_[source_axis]; }
   /// The factor from the source's unit of angles to the target's.
   double unit() const { return unit_; }
 
-  /// The converted angles. In: stored  by source axis. Out: by target axis. Without same_order, a
-  /// rotation about several axes gets a middle angle from -90 to 90 degrees; in gimbal lock the
-  /// last angle is 0.
+  /// The converted angles. In: stored  by source axis. Out: by target axis. If same_order() is
+  /// false, a rotation about several axes gets a middle angle from -90 to 90 degrees; in gimbal
+  /// lock the last angle is 0.
   Vec3 operator()(const Vec3& stored) const;
 
  private:

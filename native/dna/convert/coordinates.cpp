@@ -31,7 +31,7 @@ std::string item(const std::string& where, std::size_t i) {
   return where + "[" + std::to_string(i) + "]";
 }
 
-// Adding 0 turns -0 into 0.
+// Rounds to float. Adding 0 turns -0 into 0.
 float rounded(double v) { return static_cast<float>(v + 0.0); }
 
 // ---- source and target systems
@@ -153,15 +153,15 @@ constexpr std::size_t kAttributes = 9;  // tx ty tz rx ry rz sx sy sz
 
 bool is_rotation(std::size_t output) { return output % kAttributes / 3 == 1; }
 
-// The rotation rows of one joint in a group.
+// The rows of a joint group that rotate one joint. The first and the last row are in file order.
 struct RotationRows {
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   std::array<std::size_t, 3> rows{kNone, kNone, kNone};  // by axis
   std::size_t first = 0, last = 0;
 };
 
-// The rotation rows of each joint. If two rows write the same output the last one counts, as in the
-// evaluation.
+// The rotation rows of each joint, among the first row_count rows of the group. If two rows write
+// the same output the last one counts, as in the evaluation.
 std::map<std::size_t, RotationRows> rotation_rows(const JointGroup& g, std::size_t row_count) {
   std::map<std::size_t, RotationRows> out;
   for (std::size_t r = 0; r < row_count; ++r) {
@@ -175,14 +175,14 @@ std::map<std::size_t, RotationRows> rotation_rows(const JointGroup& g, std::size
   return out;
 }
 
-// The number of leading rows that any LOD uses, or all rows if the group lists no LODs. Further
-// rows are dropped: if they were converted together with used rows of the same joint, they would
-// change the pose.
+// The number of leading rows that at least one LOD uses, or all rows if the group lists no LODs.
+// The other rows are dropped: if they were converted together with used rows of the same joint,
+// they would change the pose.
 std::size_t used_rows(const JointGroup& g) {
   return g.lods.empty() ? g.output_indices.size() : *std::ranges::max_element(g.lods);
 }
 
-// The rows of a converted joint group.
+// The rows of a converted joint group: the output of each row, and the values row by row.
 struct Rows {
   std::vector<std::size_t> outputs;
   std::vector<float> values;
@@ -266,7 +266,7 @@ Status convert_group(const Conversion& c, const std::string& where, JointGroup& 
   return ok();
 }
 
-// Whether a LOD uses only some of a joint's rotation rows.
+// Whether any LOD uses only some of the rows with which the group rotates a joint.
 bool cuts_rotation(const JointGroup& g) {
   for (const auto& [joint, rows] : rotation_rows(g, used_rows(g))) {
     for (const std::uint16_t n : g.lods) {
@@ -303,9 +303,9 @@ std::vector<Turns> turns_of(const Dna& dna) {
   return out;
 }
 
-// Warns of joints whose rotation cannot be converted exactly to the new order of axes: they add
-// angles about several axes, several groups rotate them, or a LOD uses only some of their rotation
-// rows.
+// Warns of joints whose rotation cannot be converted exactly to the new order of axes: their angles
+// about several axes are sums, several groups rotate them, or a LOD uses only some of their
+// rotation rows.
 void warn_of_mixed_rotations(const Dna& dna, Warnings& warnings) {
   const auto& metadata = dna.joint_behavior_metadata.joint_representations;
   const std::string where = "behavior.joint_groups";
@@ -354,7 +354,8 @@ bool is_w(const std::vector<std::string>& raw_control_names, std::size_t control
 }
 
 // Whether a solver's inputs are quaternions: their number is a multiple of 4, and the distance
-// method is not the Euclidean one, or each fourth control has a name of a w (*.w or *.qw).
+// method is not the Euclidean one, or the name of each fourth control is that of a w component (*.w
+// or *.qw).
 bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_control_names) {
   if (s.raw_control_indices.size() % 4 != 0) return false;
   if (s.distance_method != 0) return true;
@@ -364,8 +365,8 @@ bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_c
   return true;
 }
 
-// Converts quaternions from the source's axes to the target's. If the basis mirrors, the sense of
-// rotation is reversed.
+// Converts quaternions from the source's axes to the target's. If one system is the mirror image of
+// the other, the sense of rotation is reversed.
 Array<float> converted_quaternions(const Basis& basis, const Array<float>& values) {
   std::vector<float> out(values.begin(), values.end());
   for (std::size_t i = 0; i + 3 < out.size(); i += 4) {
@@ -394,8 +395,8 @@ void convert_control_rotations(const Conversion& c, Dna& dna) {
 }
 
 // Warns if correctives, joint groups, channels, maps or networks read single components of a
-// quaternion, because no change of basis preserves them. Only the w is recognised, by its name (*.w
-// or *.qw).
+// quaternion, because these readers are not converted to the new axes. Only the w component is
+// recognised, by the name of its control (*.w or *.qw).
 void warn_of_components(const Dna& dna, Warnings& warnings) {
   const auto check = [&](const char* where, const auto& controls) {
     for (const auto control : controls) {
@@ -420,7 +421,8 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 // ---- networks that move joints
 
 // The numbers of the networks are not converted. Instead, parameters 3 to 9 of MlJoints name the
-// coordinate system to which the numbers refer. They stay as they are if all of them are present.
+// coordinate system to which the numbers refer. If the file has all of these parameters they stay
+// as they are.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;
   const auto& keys = joints.parameter_keys;
@@ -476,7 +478,7 @@ void warn_of_unknown_layers(const Dna& dna, Warnings& warnings) {
 }
 
 void set_system(const System& target, Dna& dna) {
-  // The layer dsce exists from 2.7 on, and only from 2.8 on stores all fields of descriptor_ext.
+  // The layer dsce exists from 2.7 on, but stores all fields of descriptor_ext only from 2.8 on.
   if (dna.descriptor_ext != target.ext && dna.version < 8) dna.version = 8;
   dna.descriptor.coordinate_system = target.axes;
   dna.descriptor.translation_unit = target.translation_unit;

@@ -134,7 +134,8 @@ LodMapping cut_mapping(const LodPlan& plan, const LodMapping& mapping, const Ind
   }
   for (const std::uint16_t lod : plan.lods) {
     if (lod >= mapping.lods.size()) continue;
-    // A LOD with an invalid row gets an invalid row, so that validate reports it.
+    // A LOD whose row does not exist gets row 65535, which does not exist either, so that validate
+    // reports it.
     lods.push_back(static_cast<std::uint16_t>(has_row(lod) ? row_to[mapping.lods[lod]] : 65535));
   }
   out.lods = std::move(lods);
@@ -202,8 +203,8 @@ void apply_to_joint_group(const LodPlan& plan, const Where& where, Lookup& looku
   g.joint_indices = std::move(joints);
 }
 
-// Which entries of channels or maps remain: the first lods[0] entries, which the finest kept LOD
-// uses, except entries whose output is dropped.
+// Which entries of channels or maps remain: the entries that the finest kept LOD uses, which are
+// the first lods[0] entries once lods is reduced, except entries whose output is dropped.
 // In/out: lods  number of entries that each LOD uses, reduced to the kept LODs
 std::vector<bool> kept_entries(const LodPlan& plan, const IndexMap& map,
                                const Array<std::uint16_t>& outputs, const Where& where,
@@ -503,7 +504,7 @@ Status apply(const LodPlan& plan, bool cut_while_reading, Dna& dna) {
 
 }  // namespace detail
 
-// The plan keeps all LODs and drops only channels.
+// Makes a plan that keeps all LODs and drops only channels, and applies it.
 core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna) {
   std::vector<Warning> unused;
   RISORIUS_TRY(validate(dna, unused));

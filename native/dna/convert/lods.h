@@ -53,17 +53,17 @@ namespace detail {
 struct LodPlan {
   std::vector<std::uint16_t> lods;  // ascending, each once
   IndexMap joints, blend_shape_channels, animated_maps, meshes;
-  // New index of the first root joint. A vertex gets it if all its joints were dropped.
+  // New index of the first root joint. A vertex is bound to it if all its joints were dropped.
   std::uint16_t root = 0;
 };
 
-/// The plan of a selection; nullopt if it keeps every LOD. Fails: kInvalidArgument (the file has
-/// none of the selected LODs). In: definition  one that validate accepts
+/// The plan of a selection; nullopt if the selection keeps every LOD. Fails: kInvalidArgument (the
+/// file has none of the selected LODs). In: definition  one that validate accepts
 core::Result<std::optional<LodPlan>> plan_lods(const Descriptor& descriptor,
                                                const Definition& definition,
                                                const LodSelection& selection);
 
-/// Which of `count` elements the mapping lists at a kept LOD.
+/// Which of `count` elements the mapping lists at any kept LOD.
 std::vector<bool> needed(const LodPlan& plan, const LodMapping& mapping, std::size_t count);
 
 /// Marks the networks that operations run at kept LODs. Out: keep  true for these networks
@@ -85,7 +85,8 @@ std::size_t cut_influences(const LodPlan& plan, float* weights, std::uint16_t* j
 
 /// Removes the blend shape channels that the plan drops, with their blend shape targets and their
 /// entries of behavior.blend_shape_channels.
-/// In: entries  [entries of behavior.blend_shape_channels] false: the entry is removed in any case
+/// In: entries  [entries of behavior.blend_shape_channels] false: the entry is removed even if the
+///              plan keeps its channel
 /// Fails: kInvalidIndex (the channel of a target does not exist)
 core::Status drop_channels(const LodPlan& plan, std::vector<bool> entries, Dna& dna);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The number of bytes of an empty value in a file, which is the smallest size of a list's element.
+// The number of bytes that a value with empty lists and texts has in a file. It is the smallest
+// size of an element of a list.
 #pragma once
 
 #include <cstdint>

@@ -12,8 +12,8 @@ using core::ErrorCode;
 using core::fail;
 using core::Result;
 
-// The position of the first bracket that exceeds the nesting limit. It is found before the library
-// builds any value.
+// The position of the first bracket that exceeds the nesting limit. It is found before
+// nlohmann::json builds any value.
 std::optional<std::size_t> find_too_deep(std::string_view text, std::size_t limit) {
   std::size_t depth = 0;
   bool in_text = false;
@@ -33,8 +33,8 @@ std::optional<std::size_t> find_too_deep(std::string_view text, std::size_t limi
   return std::nullopt;
 }
 
-// The position of a number beyond the range of float. The library's exception quotes the number but
-// has no position, so that the quote is searched for in the text.
+// The position of a number beyond the range of float. The exception of nlohmann::json quotes the
+// number but has no position, so that the number is searched for in the text.
 std::optional<std::uint64_t> find_quoted(std::string_view text, std::string_view message) {
   const std::size_t begin = message.find('\''), end = message.rfind('\'');
   if (begin == end) return std::nullopt;
@@ -44,7 +44,7 @@ std::optional<std::uint64_t> find_quoted(std::string_view text, std::string_view
 
 Result<Json> parse_text(std::string_view text) {
   try {
-    // The library would treat a zero byte as the end of the text.
+    // nlohmann::json would treat a zero byte as the end of the text.
     const std::size_t zero = text.find('\0');
     if (zero != std::string_view::npos) {
       return fail(ErrorCode::kNotDna, "", "not JSON: the text has a zero byte", zero);

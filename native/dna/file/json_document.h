@@ -18,8 +18,8 @@ struct RepeatedMember {
   std::string name;
 };
 
-// An object that rejects a repeated member: JSON readers differ in whether the first or the last of
-// the two counts.
+// An object that rejects a repeated member: some JSON readers use the first of the two values,
+// others the last.
 template <class Key, class Value, class Less, class Allocator>
 struct UniqueMap : std::map<Key, Value, Less, Allocator> {
   using std::map<Key, Value, Less, Allocator>::map;
@@ -31,7 +31,7 @@ struct UniqueMap : std::map<Key, Value, Less, Allocator> {
   }
 };
 
-// Numbers are read as float, so that they are rounded only once.
+// Fractions are read as float and not as double first, so that they are rounded only once.
 using Json = nlohmann::basic_json<UniqueMap, std::vector, std::string, bool, std::int64_t,
                                   std::uint64_t, float>;
 

@@ -35,7 +35,8 @@ using detail::json_name;
 using detail::layer_name;
 using detail::Name;
 
-// A visitor that reads the members of objects. It keeps the first error, with its path.
+// A visitor of schema.h that reads the members of JSON objects. It keeps the first error, with the
+// path of its member.
 class Reader {
  public:
   explicit Reader(const Limits& limits) : limits_(limits) {}
@@ -157,8 +158,8 @@ class Reader {
  private:
   void named(Name name, FunctionRef<void(const Json&)> body);
   bool is_list(const Json& json);
-  // Reads a list of numbers. There may be millions, so that the path of a number is only built for
-  // an error.
+  // Appends the numbers of a JSON list. There may be millions, so that the path of a number is only
+  // built for an error.
   template <class T>
   void append(const Json& json, std::vector<T>& out) {
     if (!is_list(json)) return;

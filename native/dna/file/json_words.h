@@ -37,7 +37,7 @@ inline std::string json_name(const Name& name) {
   return out;
 }
 
-/// The JSON name of a layer: its id and version.
+/// The JSON name of a layer: its id and version, such as "desc1.1".
 inline std::string layer_name(const KnownLayer& layer) {
   return std::string(layer.id) + std::to_string(layer.version >> 16) + "." +
          std::to_string(layer.version & 0xFFFF);
@@ -55,7 +55,7 @@ inline std::string to_hex(const void* data, std::size_t size) {
   return out;
 }
 
-/// Converts hex digits to bytes. Nullopt if the text is not pairs of hex digits.
+/// Converts hex digits to bytes. Nullopt if the text has other characters or an odd length.
 inline std::optional<std::string> from_hex(std::string_view text) {
   if (text.size() % 2 != 0) return std::nullopt;
   std::string out(text.size() / 2, '\0');

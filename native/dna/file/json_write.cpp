@@ -37,8 +37,8 @@ class Writer {
 
   void object(FunctionRef<void()> body);
   void member(const std::string& name, FunctionRef<void()> body);
-  // Writes an array. In: lines  true: each item is on a separate line, for structs; false: all
-  // items are on one line, for numbers
+  // Writes an array. In: lines  true: each item is on a separate line, as for structs; false: all
+  // items are on one line, as for numbers
   template <class Items, class Each>
   void array(const Items& items, bool lines, Each each) {
     begin_array();
@@ -96,8 +96,8 @@ class Writer {
     char text[24];
     out_.append(text, std::to_chars(text, text + sizeof(text), v).ptr);
   }
-  // Rotation signs are stored as uint32 in the file, and other tools of the format print them as
-  // such.
+  // Rotation signs: the file stores them as uint32, and other tools of the format print them as
+  // uint32, so that -1 is 4294967295.
   void value(std::int32_t v) { value(static_cast<std::uint32_t>(v)); }
   void value(float v);
   void value(const std::string& v);
@@ -153,8 +153,8 @@ class Writer {
   bool first_ = true;
 };
 
-// The following functions are called for every field. They are not templates, so that they are
-// compiled once and not for each of about 150 fields.
+// The following functions are called for every field. They take a FunctionRef and are not
+// templates, so that they are compiled once and not for each of about 150 fields.
 void Writer::object(FunctionRef<void()> body) {
   out_ += '{';
   ++depth_;

@@ -13,8 +13,8 @@ using core::ErrorCode;
 using core::List;
 using core::PlanarArray;
 
-// Reads a list of vectors, which is stored as two or three planes. Each plane has a count of its
-// own, and the counts must agree.
+// Reads a list of vectors, which is stored as two or three planes. The file has a count before each
+// plane, and the counts must be equal.
 template <std::size_t kPlanes>
 PlanarArray<kPlanes> LayerReader::planes() {
   const std::uint64_t first = r_.position();
@@ -59,8 +59,8 @@ std::vector<bool> LayerReader::wanted(const List<T>*, const LodMapping* mapping,
   return keep;
 }
 
-// Reads a list whose elements have their sizes in the file, and skips elements that no kept LOD
-// uses. Skipped elements remain empty until apply() removes them.
+// Reads a list whose elements begin with their size or end, and skips elements that no kept LOD
+// uses. Skipped elements are empty in the list until apply() in lods.cpp removes them.
 template <class T>
 void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
   const std::uint64_t layer_end = r_.end();
@@ -77,8 +77,8 @@ void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
     Field item(r_, name.dna, i);
     const std::uint64_t at = r_.position();
     note(at);
-    // Of an element that may be skipped only the size is read, which may be shorter than 4 bytes in
-    // a cut file.
+    // If elements may be skipped, only the 4 bytes of the size are made available first; a
+    // truncated file may have fewer.
     if (plan != nullptr) r_.enter(at, std::min<std::uint64_t>(4, r_.left()));
     const std::uint32_t mark = r_.u32();
     if (r_.failed()) break;
@@ -139,8 +139,9 @@ void LayerReader::matrix(Name name, JointGroup& g) {
 
 namespace {
 
-// Makes room for `more` values of element i. The buffer grows to the size that n elements would
-// need if all were like the first i + 1, but never beyond the bytes left in the file.
+// Makes room for the `more` values of element i of n. If the memory is too small it grows to the
+// size that n elements would need if all were like the first i + 1, but never beyond the bytes left
+// in the file.
 template <class T>
 void extend(Buffer<T>& values, std::size_t more, std::uint32_t i, std::uint32_t n,
             std::uint64_t bytes_left) {
@@ -221,7 +222,7 @@ std::size_t LayerReader::cut_vertex(float* weights, std::uint16_t* joints, std::
   return r_.failed() ? 0 : cut_influences(*plan, weights, joints, n, &known.finite);
 }
 
-// An invalid channel counts as wanted, so that the index check reports it.
+// A channel that does not exist counts as wanted, so that the check of indices reports it.
 bool LayerReader::channel_is_wanted(std::uint16_t channel) const {
   const IndexMap& channels = plan->blend_shape_channels;
   return channel >= channels.size() || channels.keeps(channel);
@@ -229,8 +230,8 @@ bool LayerReader::channel_is_wanted(std::uint16_t channel) const {
 
 // Reads ahead the channel index at the end of a blend shape target. It assumes first that all lists
 // are as long as the first one. If the channel found there is not wanted, the lists are skipped one
-// by one to the true end. Out: true: the reader is at the begin of the target again; false: it is
-// behind the target, or has failed
+// by one to the true end. Out: true: the reader is at the beginning of the target again; false: it
+// is behind the target, or has failed
 bool LayerReader::target_is_wanted() {
   const std::uint64_t begin = r_.position();
   const auto go_back = [&] { return r_.enter(begin, r_.end() - begin); };
@@ -270,8 +271,8 @@ void LayerReader::targets(Mesh& m) {
 void LayerReader::add_place(const Place& place) { places->note(r_.where(), place); }
 
 std::optional<std::uint64_t> Places::find(std::string where) const {
-  // The list index that was last cut from the end of `where`, such as 3 for "[3]"; empty if a name
-  // was cut last.
+  // Parts are cut from the end of `where` until a recorded place remains. If the last part cut was
+  // a list index, such as "[3]", this is its number; otherwise it is empty.
   std::optional<std::size_t> index;
   while (!where.empty()) {
     if (const auto at = places_.find(where); at != places_.end()) {

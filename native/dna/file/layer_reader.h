@@ -24,8 +24,9 @@ struct Place {
   std::uint32_t plane = 0;         // numbers in each plane of a vector list; 0: no planes
 };
 
-/// Records the positions of the fields that findings name, and of the structs and lists that
-/// contain them. Recording all fields of a large file would take many times its size.
+/// Records the positions of the given fields, which error messages name, and of the structs and
+/// lists that contain them. Recording all fields of a large file would take many times the file's
+/// size.
 class Places {
  public:
   explicit Places(std::set<std::string> fields) : fields_(std::move(fields)) {}
@@ -123,8 +124,9 @@ class LayerReader {
   void faces(Mesh& m);
   void skin(Mesh& m);
   void targets(Mesh& m);
-  /// Records the position of the field that is being read. In: at  its byte offset in the file;
-  /// element_size, plane  as in Place
+  /// Records the position of the field that is being read, if positions are wanted.
+  /// In: at                   its byte offset in the file
+  ///     element_size, plane  as in Place
   void note(std::uint64_t at, std::uint32_t element_size = 0, std::uint32_t plane = 0) {
     if (places != nullptr) add_place({at, element_size, plane});
   }

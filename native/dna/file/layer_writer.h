@@ -90,8 +90,8 @@ class LayerWriter {
   void element(const T& v) {
     describe(*this, v);
   }
-  // Writes a list of lists that Dna stores as one flat list and offsets. In: item(begin, n)  writes
-  // the inner list of n elements that begin at index `begin` of the flat list
+  // Writes a list of lists, which a Dna stores as one flat list and the offsets of the inner lists.
+  // In: item(begin, n)  writes an inner list: n elements of the flat list, from index `begin` on
   template <class Item>
   void rows(const core::Array<std::uint32_t>& offsets, Item item) {
     const std::size_t n = offsets.empty() ? 0 : offsets.size() - 1;

@@ -69,8 +69,8 @@ Status read_header(ByteReader& r, const Limits& limits, Dna& dna) {
   return core::ok();
 }
 
-// Reads a file once. If `findings` is set, as by check(), a failing layer is reported and the next
-// one is read; otherwise the first error ends the reading.
+// Reads a file; each object is used for one run. If `findings` is set, as by check(), the error of
+// a layer is added to it and the next layer is read; otherwise the first error ends the reading.
 class Parser {
  public:
   Parser(bytes::Source& source, const ParseOptions& options, detail::Places* places,
@@ -124,8 +124,8 @@ class Parser {
     return [this, &layer] { describe(layer_, layer); };
   }
 
-  // Makes the plan of the LOD selection. The definition must be valid for that, and is checked
-  // first.
+  // Makes the plan that carries out the LOD selection. It needs a valid definition, which is
+  // therefore checked first.
   void make_plan() {
     if (options_.lods.everything() || r_.failed() || error_) return;
     std::vector<Warning> unused;
@@ -259,7 +259,8 @@ class Parser {
     order_index(at);
   }
 
-  // Overlapping layers would let a small file claim the same bytes many times.
+  // Refuses layers that overlap, because with them a small file could have many layers of the same
+  // bytes, and would need much more memory than its size.
   void check_ranges(std::uint64_t index_end) {
     std::vector<std::size_t> order;
     for (std::size_t i = 0; i < entries_.size(); ++i) {
@@ -323,16 +324,16 @@ class Parser {
     });
   }
 
-  // The layer has 16 bytes up to 2.7 and 17 from 2.8 on, with the same layer version: only the size
-  // tells them apart.
+  // Layer dsce has 16 bytes up to 2.7 and 17 or more from 2.8 on, with the same layer version, so
+  // that only the size tells whether it has a winding order.
   void read_descriptor_ext() {
     const bool has_winding = r_.left() >= 17;
     describe(layer_, dna_.descriptor_ext);
     if (has_winding) layer_.field("face_winding_order", dna_.descriptor_ext.face_winding_order);
   }
 
-  // Reads only the numbers of controls of layers that are not loaded, because these controls still
-  // take part in the numbering of controls.
+  // Reads, from layers that are not loaded, only how many controls they have, because control
+  // indices in other layers still count them.
   void count_unread_controls() {
     const auto names = [&](const char* id, bool loaded, std::uint32_t& count) {
       const IndexEntry* e = loaded ? nullptr : find(id);
@@ -404,8 +405,8 @@ Result<Dna> run_parser(bytes::Source& source, const ParseOptions& options, detai
   return dna;
 }
 
-// Adds the byte offset to an error. The bytes are parsed again for it, because positions of fields
-// are not recorded in the first pass.
+// Adds the byte offset to an error that lacks it. The file is parsed a second time for this,
+// because the first time no positions of fields are recorded.
 Error with_offset(bytes::Source& source, const ParseOptions& options, Error error) {
   if (error.offset || error.code == ErrorCode::kInvalidArgument) return error;
   detail::Places places({error.where});
@@ -436,8 +437,8 @@ Result<Dna> parse(bytes::Source& source, const ParseOptions& options) {
   Result<Dna> dna = run_parser(source, options, known);
   if (!dna) return core::Unexpected{with_offset(source, options, dna.error())};
   if (Status valid = detail::validate(*dna, known, dna->warnings); !valid) {
-    // With a LOD filter, indices in the error's field count only kept elements, so that they do not
-    // fit the file.
+    // If LODs were selected, the indices in the error's field count only kept elements, so that
+    // they would give a wrong place in the file. The error then has no byte offset.
     if (!options.lods.everything()) return std::move(valid).propagate();
     dna = std::move(valid).propagate();  // free the first Dna before the second parse
     return core::Unexpected{with_offset(source, options, dna.error())};
@@ -460,8 +461,8 @@ std::vector<Finding> check(bytes::Source& source, const Limits& limits) {
   for (const Warning& w : dna->warnings) {
     findings.push_back({false, {ErrorCode::kInvalidValue, w.offset, w.where, w.message}});
   }
-  // If a layer could not be read it is empty or incomplete, and errors about indices into it would
-  // only repeat that error.
+  // A layer that could not be read is empty or incomplete. Errors of indices and lengths might only
+  // follow from that, so that they are left out.
   const bool whole = std::ranges::none_of(findings, &Finding::is_error);
   for (Finding& f : detail::find_all(*dna)) {
     if (!whole && f.error.code != ErrorCode::kInvalidValue) continue;

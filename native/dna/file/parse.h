@@ -13,7 +13,8 @@
 
 namespace risorius::dna {
 
-/// Upper limits for a file. In addition every count is checked against the bytes left.
+/// Upper limits for a file that is read. In addition, a count is refused if its elements need more
+/// bytes than the file has after the count.
 struct Limits {
   std::uint64_t max_bytes = std::uint64_t{4} << 30;  // of the whole file; the format's own limit
   std::uint32_t max_layers = 4096;                   // entries of the index
@@ -23,7 +24,7 @@ struct Limits {
 
 /// The parts of the file to read; other parts are skipped. The layers desc and dsce are always
 /// read. Without the definition, parse fails if a layer that is read has indices of joints,
-/// controls, channels or LOD lists, because there is nothing to check them against.
+/// controls, channels or LOD lists, because the definition has the counts that limit the indices.
 struct ParseOptions {
   bool definition = true;
   bool behavior = true;

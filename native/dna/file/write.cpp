@@ -66,14 +66,15 @@ std::vector<std::uint8_t> write_sections(const Dna& dna) {
   return w.take();
 }
 
-// A layer to write. Either `known` or `unknown` is set.
+// A layer to write. Exactly one of `known` and `unknown` is set.
 struct PlannedLayer {
   const detail::KnownLayer* known = nullptr;
   const UnknownLayer* unknown = nullptr;
 };
 
 // The layers to write: first the layers of the source's index in its order, then the layers of the
-// target version that the source lacks.
+// target version that the source lacks, then layers with content that neither of them has (only
+// with options.newer_layers).
 std::vector<PlannedLayer> plan_layers(const Dna& dna, const WriteOptions& options) {
   std::vector<PlannedLayer> plan;
   std::size_t next_unknown = 0;
@@ -96,7 +97,7 @@ std::vector<PlannedLayer> plan_layers(const Dna& dna, const WriteOptions& option
   for (const detail::KnownLayer& layer : detail::kLayers) {
     if (layer.since_minor <= options.minor) add_known(layer);
   }
-  // Then layers with content that neither the source's index nor the target version has.
+  // Layers with content that are neither in the source's index nor in the target version.
   detail::for_each_layer(dna, [&](std::string_view id, const char*, const auto& value) {
     if (value == std::remove_cvref_t<decltype(value)>{} || !options.newer_layers) return;
     for (const detail::KnownLayer& layer : detail::kLayers) {
@@ -172,9 +173,9 @@ void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
   }
 }
 
-// The face without the layers that this version cannot store, without their controls and without
-// unread controls, or nullopt if nothing has to be left out.
-// In: kept  true: layers that the version does not know are written nevertheless
+// The face without the layers that this version cannot store, and without everything that reads
+// the controls of these layers or of layers that were not loaded. nullopt: nothing has to be left
+// out. In: kept  true: layers that the version does not know are written nevertheless
 Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
                                    std::vector<Warning>& warnings) {
   const std::vector<std::string> lost =

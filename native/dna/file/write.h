@@ -13,7 +13,7 @@ namespace risorius::dna {
 struct WriteOptions {
   std::uint16_t minor = 8;  // file version 2.<minor>, 1 to 8
   /// Whether layers that the version does not know are written too, for readers that look for them.
-  /// They are unknown layers and layers of newer versions. 2.1 has no place for them.
+  /// These layers are unknown layers and layers of newer versions. A 2.1 file cannot store them.
   bool newer_layers = true;
 };
 

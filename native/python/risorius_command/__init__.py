@@ -14,7 +14,7 @@ import sys
 
 
 def main() -> int:
-    """Run a command. Returns: the exit code."""
+    """Runs the command line of `risorius`. Returns: the exit code."""
     hears = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if hears:  # otherwise the parent process asked to ignore Ctrl-C
         signal.signal(signal.SIGINT, _end)

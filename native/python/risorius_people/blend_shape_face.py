@@ -52,7 +52,7 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
 
     Args:
         base: the base mesh with its eyeballs.
-        groups: name of a group -> vertex indices.
+        groups: name of a group of the base mesh -> vertex indices.
     """
     count = len(base.positions)
     out = []
@@ -337,8 +337,8 @@ def assemble(
         ex.corrective_displacements(units, places), body.closing, body.eye_correctives, tongue
     ):  # fmt: skip
         correctives |= {tuple(pair): way for pair, way in found.items()}
-    # The corrective of CLOSED (jaw open, lips together) has no shape here. The joint fit uses it,
-    # because the joint rotations of its controls do not add up.
+    # The corrective of CLOSED (jaw open, lips together) has no displacements here. It exists for
+    # the joint fit, because the joint rotations of its controls do not add up.
     correctives[ex.CLOSED] = np.zeros_like(positions)
     raw = list(units)
     pairs = list(correctives)

@@ -19,16 +19,17 @@ from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
 
 FLOOR = 8.168  # decimetres from the soles up to the origin of the data
-# The neck is cut where y - NECK_SLOPE * hypot(x, 0.35) equals this (base mesh, in decimetres).
+# The base mesh is cut at the neck where y - NECK_SLOPE * hypot(x, 0.35) equals NECK_CUT, with x and
+# y in decimetres.
 NECK_CUT = 5.36
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035  # decimetres of the upper teeth that show below the lip of an open mouth
-# Heights above the collar's seam in decimetres: expressions do not move skin below the first
-# height, because it would come through the shirt; they fully move skin above the second. The
-# neckThroat expressions are excepted.
+# Two heights above the collar's seam in decimetres. Expressions do not move skin below the first
+# height, because the skin would come through the shirt, and fully move skin above the second one.
+# The neckThroat expressions are not limited in this way.
 COVERED = (0.06, 0.4)
 REACH = 1.3  # largest |x| of head and neck: the hands are as high as the neck, but farther out
-# (name, parent) of each joint.
+# (name, name of the parent or None) of each joint of the blend shape face.
 JOINTS = [
     ("spine_04", None),
     ("neck_01", "spine_04"),
@@ -83,7 +84,8 @@ def head_size(base: BaseMesh, positions: Floats) -> float:
 def show_upper_teeth(
     positions: Floats, groups: dict[str, Ints], jaw_open: Floats, size: float
 ) -> None:
-    """Lowers the upper teeth until some millimetres show below the lip of an open mouth.
+    """Lowers the upper teeth until TEETH_SHOW (3.5 mm) of them show below the upper lip of an open
+    mouth.
 
     Args:
         positions: float64[V, 3] in decimetres; the vertices of the upper teeth are changed.
@@ -205,8 +207,8 @@ class Body:
         positions: float64[V, 3], in decimetres.
         joints: name of a joint -> float64[3], its position.
         units: raw control -> its expression.
-        closing: ("jawOpen", raw control) -> float64[V, 3], the displacement that closes lips which
-            the jaw has opened, wholly or in a part of the mouth.
+        closing: ("jawOpen", raw control) -> float64[V, 3], the displacement by which this control
+            closes the lips of an open jaw, along the whole mouth or in a part of it.
         eyes: positions of the eyeballs, and rest pose of their lids.
         lip_rim: int64[n], vertices of the lower lip's rim, where the upper lip touches it.
         eye_correctives: two raw controls -> float64[V, 3], the displacement that keeps the lids on

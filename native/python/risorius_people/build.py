@@ -40,7 +40,8 @@ from .polygons import Floats
 from .source import PACKAGE, SHA256, Fetched, Source, SourceError, fetch
 
 NEW_JOINTS = 250
-# centimetres: 10 micrometres, so that rounding errors are at most 5 micrometres
+# Step of coordinates in centimetres: about 10 micrometres, so that rounding errors are at most 5
+# micrometres.
 DELTA_STEP = 2.0**-10
 WEIGHTS = 4096  # skin weights are multiples of 1 / WEIGHTS
 NO_WRINKLES = 4  # number of the first LOD without wrinkles
@@ -289,7 +290,8 @@ class _Making:
 
     @property
     def corrects_again(self) -> bool:
-        """Whether to search again: correctives were found, and blend shapes are left."""
+        """Whether to search again after the joint fit: the first search found correctives, and the
+        joint face has blend shapes."""
         return self.found and self.rig is not None and self.rig.shapes
 
 
@@ -316,7 +318,7 @@ def _begin_painting(making: _Making) -> None:
 def _paint(making: _Making) -> _Painted:
     """Paints textures and grows hair; it only reads the assembled face."""
     person, parts, size = making.person, making.parts, making.texture_size
-    # the vertices where hair grows are chosen on the man's head, and are the same for all people
+    # Hair grows from vertices that are chosen on the man's head; they are the same for all people.
     even = making.body.man.positions
     own = making.body.moved(making.asymmetry)
     units = making.body.man.units
@@ -326,7 +328,8 @@ def _paint(making: _Making) -> _Painted:
 
 
 def _search_correctives(making: _Making) -> None:
-    """Searches before the joints are fitted, because the joints must fit the correctives, too."""
+    """Searches for correctives before the joints are fitted, because the joints must fit them,
+    too."""
     making.dna = search_correctives(making.shapes, making.correctives, making.steps)
     making.found = making.dna.psd_count > making.shapes.psd_count
 
@@ -343,7 +346,8 @@ def _fit_joints(making: _Making) -> None:
 
 
 def _correct_again(making: _Making) -> None:
-    """Searches again after the fit, because errors of joints and shapes add up."""
+    """Searches for correctives again after the joint fit, because the errors of joints and of blend
+    shapes add up in combined expressions."""
     if not making.corrects_again:
         return
     making.steps.at(_AGAIN_BEGINS, "searching again for errors of joints and shapes together")

@@ -22,8 +22,9 @@ COLLAR_ROUND = 0.3
 HEM = 4.62  # height of the lower edge
 SHOULDER = 2.02  # largest |x|, where the sleeve is cut
 ROOM = 0.02  # vertices move away from the trunk's middle by this fraction of their distance to it
-# Rows of the collar from its seam over its edge to the inside: millimetres away from the neck, and
-# up. The collar leans towards the neck like ribbing; an upright one looks like a pipe.
+# Rows of the collar from its seam over its upper edge to the inside: (millimetres away from the
+# neck, millimetres up). The collar leans towards the neck like ribbing, because an upright collar
+# looks like a pipe.
 _COLLAR = (
     (1.6, -2.5), (2.4, 0.5), (1.3, 5.0), (-1.4, 9.6), (-3.2, 10.6), (-4.0, 9.2), (-2.4, 3.0),
 )  # fmt: skip
@@ -112,11 +113,13 @@ def unrolled(positions: Floats) -> Floats:
 def spread(vertices: list[int], most: int) -> list[int]:
     """Every k-th vertex, with the largest k for which at least `most` vertices remain.
 
-    The matrix of an Operator stays sparse because all vertices of a ring depend on these few.
+    The few vertices represent the ring in the mean on which all vertices of the ring depend; with
+    all vertices of the ring, the matrix of the Operator would have many more entries.
 
     Args:
         vertices: vertices in their order on the ring.
-        most: wanted number of vertices; fewer than twice as many are returned.
+        most: smallest number of vertices to return; fewer than twice as many are returned. A ring
+            with fewer vertices is returned unchanged.
     """
     return vertices[:: max(1, len(vertices) // most)]
 
@@ -137,8 +140,8 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
     trunk = np.flatnonzero(np.abs(positions[:, 0]) < 1.0).tolist()
     near = 1 / len(trunk)
     # Each vertex moves away from the mean of the trunk's vertices, because this motion is linear in
-    # the positions. The trunk's middle at the height of the vertex would need a division, which is
-    # not linear, and looks much the same.
+    # the positions. A motion away from the trunk's middle at the height of the vertex would need a
+    # division, which is not linear, and would look much the same.
     for i in range(count):
         rows.append((i, i, 1 + ROOM))
         rows += [(i, j, -ROOM * near) for j in trunk]

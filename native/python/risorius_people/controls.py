@@ -2,7 +2,7 @@
 """GUI controls of the sample people: names, ranges, and their mapping to raw controls."""
 
 # (GUI control, raw control for its positive half, raw control for its negative half or ""). {s} is
-# replaced by the side.
+# replaced by L or R; the names of the raw controls get the same letter at their end.
 SIDED = [
     ("CTRL_{s}_brow_down.ty", "browDown", ""),
     ("CTRL_{s}_brow_lateral.ty", "browLateral", ""),
@@ -81,7 +81,8 @@ MIDDLE = [
     ("CTRL_C_tongue_tipMove.tx", "tongueTipLeft", "tongueTipRight"),
     ("CTRL_C_tongue_thickThin.ty", "tongueThick", "tongueThin"),
 ]
-# Controls of lips and teeth; {v} is replaced by U (upper) or D (lower), {s} by the side.
+# GUI controls of lips and teeth, as in SIDED; {v} is replaced by U (upper) or D (lower), {s} by L
+# or R.
 LIPS = [
     ("CTRL_{s}_mouth_towards{v}.ty", "mouthLipsTowards{v}", ""),
     ("CTRL_{s}_mouth_tighten{v}.ty", "mouthLipsTighten{v}", ""),
@@ -134,7 +135,8 @@ def _two_sided(up: str, down: str) -> list[tuple[str, Range]]:
 
 
 def _filling(names: list[str]) -> list[tuple[str, Range]]:
-    """Conditionals that raise raw controls from 0 to 1 one after the other; each stays at 1."""
+    """Conditionals that raise raw controls from 0 to 1 one after the other; each control then stays
+    at 1."""
     count = len(names)
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):
@@ -145,7 +147,8 @@ def _filling(names: list[str]) -> list[tuple[str, Range]]:
 
 
 def _passing(names: list[str]) -> list[tuple[str, Range]]:
-    """Conditionals that raise and lower raw controls: each starts where the one before peaks."""
+    """Conditionals that raise raw controls from 0 to 1 and lower them again, one after the other:
+    each control starts to rise where the control before it has its peak."""
     count = len(names) + 1
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):

@@ -34,13 +34,16 @@ class Expression:
 
 
 def side_masks(positions: Floats) -> dict[str, Floats]:
-    """float64[V] by "L" and "R": weights with sum 1; the character's left is +x."""
+    """Weights of the left and right side at each vertex: `L` or `R` -> float64[V].
+
+    Both weights of a vertex sum to 1. The character's left is +x.
+    """
     left = smooth_step(positions[:, 0] / 0.5 + 0.5)
     return {"L": left, "R": 1 - left}
 
 
 def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
-    """float64[V] by "U" and "D": weights of upper and lower lip with sum 1.
+    """`U` or `D` -> float64[V], weight of the upper or lower lip at each vertex; both sum to 1.
 
     The lips touch, so their positions cannot distinguish them. The lower lip consists of the
     vertices that jawOpen moves.
@@ -188,8 +191,8 @@ def add_joint_motion(
 def cheek_mass(units: dict[str, Expression], places: Floats, side: str) -> Floats:
     """float64[V, 3]: the displacement that bulges a cheek in a true smile.
 
-    The bulge ends at the laugh line, where the skin folds in. Vertices that the smile's controls do
-    not move stay, such as the teeth.
+    The bulge ends at the laugh line, where the skin folds in. Vertices that the controls of the
+    smile do not move, such as the teeth, have no displacement.
 
     Args:
         units: raw control -> expression.
@@ -284,7 +287,7 @@ def corrective_displacements(
         # The open jaw stretches the lower lip, so a smile lifts the lip less.
         smile = out[f"mouthCornerPull{side}"].displacement
         result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile
-        # If the lower lid is raised, the upper lid has a shorter way to close.
+        # If the cheek raises the lower lid, the upper lid has a shorter way to close.
         blink = out[f"eyeBlink{side}"].displacement
         raised = out[f"eyeCheekRaise{side}"].displacement
         travel = np.linalg.norm(blink, axis=1)

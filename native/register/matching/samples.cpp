@@ -34,7 +34,7 @@ class Grid {
     for (std::uint32_t i = 0; i < points.size(); ++i) order_[next[cube(points[i])]++] = i;
   }
 
-  /// Calls visit(index) for all samples within a radius of p, and for some beyond it.
+  /// Calls visit(index) for all samples within a radius of p, and for some that are farther away.
   template <class Visit>
   void around(const Vec3& p, double radius, const Visit& visit) const {
     if (order_.empty()) return;

@@ -42,8 +42,8 @@ Sparse differences(const Graph& graph, const Points& base) {
   return out;
 }
 
-/// [V, V] matrix; its product with values of vertices is, for each vertex, the sum of the
-/// differences from its neighbours' values.
+/// [V, V] matrix; its product with values of vertices is, for each vertex, the sum of its value
+/// minus the value of each neighbour.
 Sparse stretches(const Graph& graph) {
   std::vector<Eigen::Triplet<double>> entries;
   for (std::uint32_t v = 0; v < graph.size(); ++v) {

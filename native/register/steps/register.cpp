@@ -81,7 +81,8 @@ class Laying {
         options_(options),
         progress_(progress) {}
 
-  /// In: far  whether the start comes from pairs alone
+  /// Runs the coarse steps and returns the vertices. In: far  whether the start comes from pairs
+  /// alone
   core::Result<Points> coarse(const Points& start, bool far) const;
   core::Result<Points> fine(const Points& base) const;
   steps::Matcher const& matcher() const { return matcher_; }

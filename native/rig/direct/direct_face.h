@@ -34,7 +34,7 @@ struct FaceParts {
   std::vector<Mesh> meshes;
 };
 
-/// Where to write the vertices of a mesh.
+/// A mesh and the memory to which its vertices are written.
 struct Target {
   std::uint32_t mesh = 0;
   float* out = nullptr;  // [vertices, 3]
@@ -64,6 +64,7 @@ struct FaceFrame {
 /// Not thread-safe.
 class DirectFace {
  public:
+  /// Prepares the evaluation of a face.
   /// Fails: kInvalidIndex, kInvalidLength or kInvalidValue if the parts do not fit together.
   static core::Result<std::unique_ptr<DirectFace>> make(FaceParts parts);
 
@@ -125,7 +126,7 @@ class DirectFace {
   std::vector<float> matrices_, last_matrices_;
   core::AlignedVector<float> rows_;
   std::vector<float> weights_;
-  // [bones] and [channels]: the frame in which each changed last.
+  // [bones] and [channels]: number of the frame in which each bone and each channel changed last.
   std::vector<std::uint64_t> bone_changed_, channel_changed_;
 };
 

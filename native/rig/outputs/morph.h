@@ -29,7 +29,7 @@ void evaluate_morph(const Morph& morph, const float* weights, const float* base,
                     float* out) noexcept;
 
 /// values[vertex - first] += weight * delta, for n deltas.
-/// In: first   the vertex of the first row of values, float32[.., 3]
+/// In: first   the vertex to which the first row of values, float32[.., 3], belongs
 void add_deltas(const Morph::Delta* deltas, std::size_t n, float weight, std::uint32_t first,
                 float* values) noexcept;
 

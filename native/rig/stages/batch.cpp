@@ -15,7 +15,7 @@ namespace {
 using simd::kFrames;
 
 // Fewer frames than this are evaluated one by one, because a block takes at least the time of three
-// to four single frames, even if it has fewer.
+// to four single frames, even if it has fewer frames.
 constexpr std::size_t kFewest = 4;
 
 PoseView frame_of(const Rig& rig, const PoseView& first, std::size_t n) {

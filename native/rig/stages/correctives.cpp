@@ -185,8 +185,8 @@ void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
   Correctives(rig, work, controls).watched(lod, active, kept);
 }
 
-// Lists active controls in ascending order: raw, correctives, networks and poses.
-// In: had_steps  other steps ran since list_sources, which may have changed raw controls
+// Lists all active controls in ascending order: raw, corrective, network and RBF pose controls.
+// In: had_steps  networks or solvers ran since list_sources and may have changed raw controls
 void list_active(const Rig& rig, bool had_steps, Workspace& work, const float* controls) noexcept {
   std::uint16_t* active = work.active.data();
   std::size_t n = had_steps ? append_active(controls, 0, rig.raw_count, active) : work.raw_active;

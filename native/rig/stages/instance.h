@@ -26,7 +26,7 @@ class Instance {
   /// One value for each region, mesh after mesh. At 0 the networks of the region are skipped and
   /// their outputs are 0, or 1 for the w of a joint's quaternion. Other values have no effect.
   std::span<const float> masks() const { return work_.masks; }
-  /// In: index below the number of masks.
+  /// Sets the value of a region in masks(). In: index  below the number of masks
   void set_mask(std::size_t index, float value) noexcept;
 
  private:

@@ -136,8 +136,8 @@ void for_words(std::uint32_t begin, std::uint32_t end, F f) noexcept {
   }
 }
 
-// Whether a group writes into a block that an active group also writes. Then the group's rows are
-// placed too, and must be 0 if it is not active.
+// Whether a group writes into a block that an active group also writes. The rows of such a group
+// are also copied to joint attributes, and must be 0 if the group is not active.
 bool shows(const JointGroup& g, const Workspace& work) noexcept {
   bool live = false;
   for_words(g.blocks_begin, g.blocks_end, [&](std::size_t word, std::uint64_t bits) {

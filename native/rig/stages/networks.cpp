@@ -135,8 +135,8 @@ void turn(const Rig& rig, const Quaternion& q, float* to) {
   detail::store_rotation(rig, multiply(q, {to[0], to[1], to[2], to[3]}), to);
 }
 
-// Converts a scale to the face's axes. It has no sign along an axis, so that its values are only
-// permuted.
+// Converts a scale to the face's axes. A scale along an axis is the same in both directions, so
+// that the three values are only permuted.
 std::array<float, 3> scale_in_our_axes(const Rig& rig, const std::array<float, 3>& v) {
   std::array<float, 3> out{};
   for (std::size_t i = 0; i < 3; ++i) {

@@ -61,7 +61,7 @@ double kernel(std::uint32_t function, double d, double r) noexcept {
 double clamp01(double v) { return v < 0.0 ? 0.0 : (v > 1.0 ? 1.0 : v); }
 
 // Computes the weights of the poses before normalization, scale and threshold.
-// Out: near    kernel value of each pose's distance
+// Out: near    for each pose, the kernel's value at the distance from its target
 //      values  weights; the sum of the weights is returned
 double pose_values(const Rig& rig, const RbfSolver& s, const double* inputs, double* near,
                    double* values) noexcept {

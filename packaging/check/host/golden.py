@@ -20,8 +20,9 @@ import numpy as np
 RAW, JOINTS, SHAPES, MAPS = 0, 2, 3, 4
 BEYOND = ("rbfSolvers", "twists", "swings", "mlControls", "mlTypes")
 LATENT = 1  # option of risorius_create with which the reference evaluates
-# Allowed difference, as a fraction of the largest value of a kind of output. Sums of some hundred
-# products differ by this if the order of the products differs.
+# Largest difference that counts as equal, as a fraction of the largest value of the same kind of
+# output. A sum of some hundred products may differ by this if its products are added in another
+# order.
 TOLERANCE = 64 * np.finfo(np.float32).eps
 
 

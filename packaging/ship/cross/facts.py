@@ -3,8 +3,9 @@
 
     facts.py FACTS.tsv... > table.md
 
-A line of FACTS.tsv has platform, Python, column and text, separated by tabs. The last line of a
-cell counts. A cell without a line says NOT DONE or NOT RUN.
+A line of FACTS.tsv has platform, Python, column and text, separated by tabs. If several
+lines name the same platform, Python and column, the last one counts. A cell without a line says NOT
+DONE or NOT RUN.
 """
 
 import sys

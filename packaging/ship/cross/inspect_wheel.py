@@ -100,7 +100,9 @@ def names_of_python(program: Path) -> set[str]:
 
 
 def python_has(undefined: Iterable[str], program: Path) -> str:
-    """Check that a Python exports all Python symbols that the module imports. Returns a line.
+    """Check that a Python exports all Python symbols that the module imports.
+
+    Returns a line of the report on the wheel.
 
     Args:
         undefined: imported symbols of the module.

@@ -63,7 +63,7 @@ def other_tag(files: Files) -> Files:
 
 
 def faults(platform: str) -> Iterator[tuple[str, Plant, str]]:
-    """Yields (name of a fault, function that plants it, word expected in the message)."""
+    """Yields (name of a fault, function that plants it, word expected in the error message)."""
     yield "a benchmark", lambda files: {**files, "risorius/rig_bench": b"x"}, "rig_bench"
     yield "a text", lambda files: {**files, "risorius/notes.txt": b"x"}, "notes.txt"
     yield "no licence", without("NOTICES"), "licences"

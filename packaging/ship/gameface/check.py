@@ -2,10 +2,11 @@
 """check.py FOLDER FACE.dna [TAKE.csv]: compares three.js in chromium with the file and the rig.
 
 FOLDER has node_modules, page.html and combinations.js. The face is exported as glTF. With each
-morph target alone, the vertices in three.js must equal both the sum of the exported file's numbers
-and the rig's vertices. For frames
-of a take, they must equal the sum of the file's numbers. The distance from the rig is printed with
-and without the combination driver; with it, the distance must be at most DRIVEN_MM.
+morph target alone, the vertices in three.js must equal both the vertices computed from the exported
+file (base positions plus weighted targets) and the rig's vertices. For frames of a take, they must
+equal the vertices computed from the file. The distance from the rig is printed with and without
+combinations.js, which sets the weights of the targets for combinations; with it, the distance must
+be at most DRIVEN_MM, 0.5 mm.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ async def client(one: Browser, weights: Mapping[str, float], *, table: bool) -> 
     Args:
         one: the browser.
         weights: morph target -> weight.
-        table: use the combination driver.
+        table: whether combinations.js also sets the weights of the targets for combinations.
     """
     found = await one.evaluate(f"at({json.dumps(dict(weights))}, {json.dumps(table)})")
     return places(found)
@@ -86,11 +87,11 @@ async def try_kind(one: Browser, folder: Path, face: Path, kind: str, take: Path
 
 
 async def try_take(one: Browser, posed: Any, take: Path, table: Any, kind: str) -> None:
-    """Compare frames of a take in three.js with the sum of the file's numbers and with the rig.
+    """Compare frames of a take in three.js with vertices computed from the file and with the rig.
 
     Args:
         one: the browser.
-        posed: the face's poses.
+        posed: computes vertices from the file and from the rig.
         take: the take, a Live Link Face CSV.
         table: the combination table of the file.
         kind: name of the file's kind, key of KINDS.

@@ -35,7 +35,7 @@ SWINGS_MM = 1.0  # least distance that a hair vertex must swing after the head h
 
 
 def long_haired(face: Path) -> Any:
-    """A face whose cards of hair hang lower."""
+    """A face whose hair cards are LONGER (5) times as long, measured down from their roots."""
     dna = risorius.load(face)
     for name, mesh in zip(dna.mesh_names, dna.meshes, strict=True):
         if name.startswith("hair"):

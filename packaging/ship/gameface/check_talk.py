@@ -65,12 +65,15 @@ async def try_file(
 
 
 async def try_voice(one: Browser, folder: Path, found: GlbFile, kind: str, voice: Path) -> float:
-    """Let the avatar speak. Returns the largest distance in mm of a vertex from the file's numbers.
+    """Let the avatar speak.
+
+    Returns the largest distance in mm between a vertex in TalkingHead and its position computed
+    from the file.
 
     Args:
         one: the browser.
-        folder: folder of the page; also gets a picture.
-        found: the file.
+        folder: folder of the page; a picture of the avatar is written into it.
+        found: the exported file.
         kind: key of FILES.
         voice: the sound; its transcript is the file with the ending .txt.
     """

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """check_vrm.py FOLDER FACE.dna [TAKE.csv [VOICE.wav]]: tests exported VRM files in three-vrm.
 
-With each expression alone, the vertices must equal both the sum of the file's numbers and the
-rig's vertices. A real take is played by the 52 ARKit units, a voice by visemes. Also checks
-that emotions override blinks as the file says, that the head turns, and that the eyes look at a
-target by expressions.
+With each expression alone, the vertices must equal both the vertices computed from the file (base
+positions plus weighted targets) and the rig's vertices. A real take is played by the 52 ARKit
+units, a voice by visemes. Also checks that emotions override blinks as the file says, that the head
+turns, and that the eyes look at a target by expressions.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ class Shown:
     """A file shown in three-vrm.
 
     Attributes:
-        worst: largest distance in mm so far between three-vrm and the file's numbers.
+        worst: largest distance in mm so far between a vertex in three-vrm and its position computed
+            from the file.
     """
 
     def __init__(self, one: Browser, found: GlbFile) -> None:
@@ -89,7 +90,12 @@ def weights_of(state: Mapping[str, Any]) -> dict[str, float]:
 
 
 def expect(weights: Mapping[str, float], wanted: Mapping[str, float]) -> None:
-    """Check that the wanted morph targets have their weights, clamped to 0..1, all others 0."""
+    """Check the weights of all morph targets.
+
+    Args:
+        weights: morph target -> weight found in three-vrm.
+        wanted: morph target -> expected weight, clamped to 0..1; 0 for targets that are missing.
+    """
     for name, weight in weights.items():
         asked = min(1.0, max(0.0, wanted.get(name, 0.0)))
         if abs(weight - asked) > 1e-3:
@@ -145,7 +151,10 @@ async def try_expressions(shown: Shown, folder: Path, dna: Any, rig: Any, kind: 
 
 
 def old_name(name: str) -> str:
-    """The name of a target's expression in three-vrm for VRM 0.x; only "surprised" differs."""
+    """The name of a morph target's expression in three-vrm for VRM 0.x.
+
+    Only "surprised" has another name there, "Surprised".
+    """
     return "Surprised" if name == "surprised" else name
 
 
@@ -199,7 +208,8 @@ async def try_gaze(shown: Shown, found: GlbFile) -> None:
 
 
 def turned(rest: Any, at: Any) -> Any:
-    """float64[3, 3]: the rotation that best moves an eye's neutral vertices onto the posed ones.
+    """float64[3, 3]: the rotation that best moves an eye's neutral vertices onto its posed
+    vertices.
 
     Args:
         rest: neutral vertices [V, 3].

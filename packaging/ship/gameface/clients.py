@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Opens pages with three.js clients in chromium, and compares their vertices with the file."""
+"""Opens pages with three.js in chromium, and compares their vertices with the exported file."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def apart(a: Mapping[str, Any], b: Mapping[str, Any]) -> float:
 def from_the_file(
     found: GlbFile, state: Mapping[str, Any], mixes: Mapping[str, Mapping[str, float]]
 ) -> float:
-    """The largest distance in mm between a client's vertices and those computed from the file.
+    """The largest distance in mm between a vertex in a client and its position by the file.
 
     Args:
         found: the file.

@@ -3,7 +3,7 @@
 
 MODULES is the folder into which pip installed bpy-vrm-format. Checks that Blender's bones,
 expressions, licence and look-at equal those of the file, and that each shape key moves the vertices
-by the file's numbers.
+as the morph target in the file does.
 """
 
 from __future__ import annotations
@@ -83,7 +83,10 @@ def try_old(read: Any, own: Any) -> tuple[int, int, str]:
 
 
 def moved(found: GlbFile, mesh: str) -> float:
-    """The largest difference of a coordinate between shape keys and the file's targets, in mm."""
+    """The largest difference in mm between a mesh's shape keys and the targets of the file.
+
+    The x, y and z of each vertex's displacement are compared.
+    """
     data: Any = bpy.data.objects[mesh].data
     if data.shape_keys is None:
         assert not found.names(mesh)

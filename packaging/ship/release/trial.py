@@ -50,7 +50,7 @@ def module():
 
 
 def window():
-    """A context override for operators of the 3D view in the main window."""
+    """A context override that lets operators run in the 3D viewport of the main window."""
     main = bpy.context.window_manager.windows[0]
     area = next(a for a in main.screen.areas if a.type == "VIEW_3D")
     region = next(r for r in area.regions if r.type == "WINDOW")
@@ -79,7 +79,7 @@ def close_preferences():
 
 
 def said(call, **arguments):
-    """The sorted result of an operator, or the text of its error."""
+    """The result of an operator as a list such as ["FINISHED"], or the text of its error."""
     try:
         return sorted(call(**arguments))
     except RuntimeError as error:
@@ -92,7 +92,7 @@ def face():
 
 
 def chin(value):
-    """The evaluated vertex positions of the head, at a value of the slider jawOpen."""
+    """The positions of the head's vertices, after the slider jawOpen has been set to a value."""
     rig, bone = face()
     bone[SLIDER] = value
     rig["risorius_controls"].update_tag()
@@ -201,7 +201,7 @@ def after():
 
 
 def twice():
-    """Install the same add-on a second time from a file, and uninstall it."""
+    """Install the add-on a second time, into another repository, and uninstall this copy."""
     path = next((OUT / "twice").glob("*.zip"))
     found = {"install": said(
         bpy.ops.extensions.package_install_files,

@@ -38,7 +38,7 @@ def options(rna: bpy.types.Struct) -> list[dict[str, Any]]:
 
 
 def buttons(cls: type) -> list[str]:
-    """Markdown links to the operators in a panel's source code, in order and without repeats."""
+    """Markdown links to the operators that a panel's source code names, in its order."""
     text = inspect.getsource(cls)
     found = re.findall(r'operator\(\s*"risorius\.(\w+)"', text)
     known = [getattr(bpy.ops.risorius, name).get_rna_type() for name in dict.fromkeys(found)]

@@ -24,7 +24,7 @@ FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 
 
 def listed(nav: str) -> list[str]:
-    """The pages in the navigation that are files of the project, and not made by this script.
+    """The pages in the navigation that are files of the project; generated pages are left out.
 
     Args:
         nav: text of mkdocs.yml.
@@ -115,7 +115,10 @@ def commands() -> str:
 
 
 def python_item(module: ModuleType, name: str) -> str:
-    """The entry of a public name in Markdown: a class or function by reference, or a value as text.
+    """The Markdown entry of a public name.
+
+    For a class or function it is a line "::: NAME", which mkdocstrings replaces by the docstring;
+    for a value, it is the value as text.
 
     Args:
         module: the module that exports the name.
@@ -128,7 +131,7 @@ def python_item(module: ModuleType, name: str) -> str:
 
 
 def python_api() -> str:
-    """The page on the Python API: the names of `risorius`, then those of single modules."""
+    """The page on the Python API: the names of `risorius`, then the names of single modules."""
     import risorius
 
     parts = [

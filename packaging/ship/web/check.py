@@ -51,13 +51,14 @@ EVALUATE = """(rows => {
 })(%s)"""
 
 
-# Script: the posed vertices of the first mesh in scene space, float32[positions, 4].
+# JavaScript whose value is the posed vertices of the page's first mesh in scene space,
+# float32[vertices, 4]: x, y and z, and a fourth number without meaning.
 PLACED = (
     "risorius.library.numbers(Float32Array, risorius.parts.get(0).skin.placed,"
     " 4 * risorius.parts.get(0).skin.count)"
 )
-# Script: draws five poses in which a third of the controls is active. Returns the milliseconds of
-# the median pose: [evaluation, moving the vertices, upload, drawing].
+# JavaScript that draws five poses in which a third of the controls is active. Its value is the
+# milliseconds of the median pose: [evaluation, moving the vertices, upload, drawing].
 COST = """(async () => {
   const gl = risorius.canvas.getContext("webgl2");
   const own = gl.bufferSubData.bind(gl);

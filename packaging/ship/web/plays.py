@@ -113,7 +113,18 @@ async def _open(one: Browser, page: Path, width: int, height: int, phone: bool =
 
 
 async def _eye(one: Browser, page: Path, how: str) -> str:
-    """Check that an eye has an iris: many colours, and a dark part in the middle of the picture."""
+    """Check that an eye has an iris: many colours, and a dark part in the middle of the picture.
+
+    Args:
+        one: the browser.
+        page: path of the page.
+        how: words after "an eye" in the sentences, such as "without a picture".
+
+    Returns: a sentence for the report.
+
+    Raises:
+        RuntimeError: the eye has no iris.
+    """
     await one.open(page, 400 + 350, 400)
     colors, dark = await one.evaluate(EYE)
     if colors < 40 or not 0.01 < dark < 0.2:
@@ -186,7 +197,7 @@ async def _dropped(one: Browser, file: Path, clip: risorius.Clip, face: Path) ->
 
 
 async def _touch(one: Browser, page: Path) -> str:
-    """Check touch in an emulated phone: turn by one finger, zoom by two, drag a slider."""
+    """Check touch in an emulated phone: one finger turns the face or drags a slider, two zoom."""
     await _open(one, page, 390, 844, phone=True)
 
     async def strokes(*fingers: tuple[tuple[int, int], tuple[int, int]]) -> None:

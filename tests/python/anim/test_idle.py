@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests idle movement: equal for equal seeds, in range, as fast and as frequent as people's."""
+"""Tests idle movement: equal seeds give equal clips, and values are in range.
+
+Blinks and gazes are as fast and as frequent as those of people.
+"""
 
 from __future__ import annotations
 

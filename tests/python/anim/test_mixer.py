@@ -58,7 +58,10 @@ def range_of(layer, clip):
 
 
 def moment(layer, clip, time):
-    """The time in a layer's range that it shows at a scene time, in s; None: it has no effect."""
+    """The time within the layer's range whose values it shows at a scene time, both in seconds.
+
+    None if the layer has no effect at this scene time.
+    """
     start, end = range_of(layer, clip)
     if start <= time <= end:
         return time
@@ -83,9 +86,9 @@ def weight_at(layer, clip, t):
 
 
 def mixed(names, layers, time, base=None):
-    """The mixed controls at a time, by steps 1, 2 and 5 of the comment in mixer.h.
+    """The mixed controls at a time, without reactions and exclusive controls.
 
-    That is without reactions and exclusive controls.
+    These are steps 1, 2 and 5 of the five steps that the comment in mixer.h describes.
     """
     out = np.zeros(len(names), np.float32) if base is None else np.array(base, np.float32)
     solo = any(layer.solo for layer in layers)
@@ -213,7 +216,10 @@ def test_bakes_what_it_evaluates():
 
 
 def test_a_warp_that_falls_plays_backwards():
-    """A clip whose value is its time shows the clip time that the warp gives: 0.75 - t / 2."""
+    """The warp maps the scene time t to the clip time 0.75 - t / 2.
+
+    The value of the clip's curve is the clip time, so the mixed control must show this time.
+    """
     ramp = Clip(["mouth"], [np.arange(25) / 24], 24.0)
     mixer = Mixer(["mouth"], [Layer(ramp, warp=([0.25, 1.25], [0.625, 0.125]))])
     times = np.linspace(0.25, 1.25, 11)

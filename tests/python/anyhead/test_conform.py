@@ -98,7 +98,7 @@ def stretched(points):
 
 
 def posed(dna, mesh, **raw):
-    """float64[V, 3]: posed vertices, computed by the oracle and by the skinning of the tests.
+    """float64[V, 3]: posed vertices, computed without the package by oracle.py and skin_oracle.py.
 
     Args:
         raw: raw control without prefix -> value; the others keep their initial values.
@@ -308,8 +308,8 @@ def test_axes_and_units_of_the_file_do_not_matter(face):
     for a, b in zip(found.meshes, wanted.meshes, strict=True):
         assert np.abs(a.positions - b.positions).max() < 1e-5
         assert np.abs(a.normals - b.normals).max() < 0.05  # polygons have other triangulations
-    # The grid of the smoothing depends on the axes; the root joint, far below the head, differs
-    # most.
+    # The smoothing uses a grid along the axes of the file, so joints may differ slightly. The root
+    # joint, far below the head, differs most.
     off = np.abs(found.neutral_joint_translations - wanted.neutral_joint_translations)
     assert off.max() < 3e-3
     assert np.median(off) < 1e-4

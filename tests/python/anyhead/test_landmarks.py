@@ -75,7 +75,7 @@ def closed(surface: Surface, around: np.ndarray) -> Surface:
 
 
 def joined(one: Surface, other: Surface) -> Surface:
-    """One surface of two; the second one's vertices follow the first one's."""
+    """Two surfaces as one surface; the vertices of `other` follow the vertices of `one`."""
     return Surface(
         np.concatenate([one.points, other.points]),
         np.concatenate([one.triangles, other.triangles + len(one.points)]),

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests of a head's jaw, measured by its skin or its own teeth.
+"""Tests how the jaw of a head is measured by its skin or by its own teeth.
 
-Also tested: pairs of balls may be eyes, the search for a face can be stopped, and lids meet.
+Other tests of heads: pairs of balls may be eyes, the search for a face can be stopped, and lids
+move until they meet.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests joint rigs made from expressions: an independent reader checks them; refused input."""
+"""Tests joint rigs made from expressions by an independent reader; invalid input is refused."""
 
 import copy
 import importlib.util

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests heads from FBX: pivots, orders of rotation, axes, units, in-between targets; bad files."""
+"""Tests heads from FBX: pivots, orders of rotation, axes, units, in-between targets.
+
+Damaged and unsuitable files are refused.
+"""
 
 import command_line
 import face_shapes

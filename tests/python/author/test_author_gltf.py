@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests heads from glTF: seams, sparse targets, strides, rotated and scaled nodes; bad files."""
+"""Tests heads from glTF: seams, sparse targets, strides, rotated and scaled nodes.
+
+Unsuitable files are refused.
+"""
 
 import command_line
 import face_shapes

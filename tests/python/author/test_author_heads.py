@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests heads of several meshes in any unit and direction: joints, sides, textures, bad input."""
+"""Tests heads of several meshes, in any unit and facing any direction.
+
+Joints, sides and textures are tested, and that bad input is refused.
+"""
 
 import struct
 from functools import cache

@@ -56,8 +56,8 @@ def test_visemes_and_faces_become_expressions():
 
 
 def test_the_names_of_icts_head_are_all_known():
-    # ARKit's shapes without tongueOut, with sides for browInnerUp and cheekPuff, and with
-    # cheekRaiser and PupilDilate
+    # ICT's head has ARKit's shapes without tongueOut. It has browInnerUp and cheekPuff for each
+    # side, and cheekRaiser and PupilDilate in addition.
     units = [u.replace("Left", "_L").replace("Right", "_R") for u in arkit.mapping()]
     names = [u for u in units if u not in ("browInnerUp", "cheekPuff", "tongueOut")]
     sided = ("browInnerUp", "cheekPuff", "cheekRaiser", "PupilDilate")

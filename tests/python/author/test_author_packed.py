@@ -106,7 +106,10 @@ def test_a_packed_head_is_its_plain_twin(tmp_path):
 
 @pytest.mark.parametrize("bits", [12, 23])
 def test_floats_and_corners_in_a_row_are_unpacked(tmp_path, bits):
-    """Unpacked are the exponential filter, mode INDICES, and two accessors of a buffer view."""
+    """A GLB is read whose packed data use features that gltfpack's usual files lack.
+
+    These are the exponential filter, the mode INDICES, and two accessors in one buffer view.
+    """
     positions, moved = face_shapes.head()[0] / 100, face_shapes.expressions(face_shapes.head()[0])
     jaw = moved["jawOpen"] / 100
     glb = Glb()

@@ -64,8 +64,9 @@ KINDS = {
 
 
 READERS = {
-    # Reader, suffix of the test's file, and words of the kinds that are not tested with this
-    # reader, because it reads such files or has a more detailed error for them.
+    # A row has the reader, the suffix of the test's file, and words that occur in names of KINDS.
+    # Kinds with such a word are not tested with this reader, because it reads such files or has a
+    # more detailed error for them.
     "animation": (importing.read, "csv", ("FBX", "glTF")),
     "json of animation": (lambda p: importing.read(p, kind="json"), "json", ("FBX", "glTF")),
     "clip": (risorius.Clip.load, "rzc", ("clip of",)),

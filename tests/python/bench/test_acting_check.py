@@ -104,10 +104,11 @@ def test_hair_under_the_skin_is_seen():
 
 
 def test_where_skin_folds_far_its_other_side_is_found_among_more_triangles():
-    """A hair far from its root is measured from the near side of the skin only with more triangles.
+    """A hair that is far from its neutral place needs more triangles to be measured correctly.
 
-    The skin is a tube. The few triangles nearest to the hair's root are on the far side of the
-    tube, so the hair beyond the tube seems to be inside the skin.
+    The skin is a tube, and the hair moves from one side of the tube to the other side. The NEAR
+    triangles nearest to its neutral place are all on the first side, so the hair seems to be
+    inside the skin. The AROUND nearest triangles contain the other side.
     """
     around, along = 24, 5
     angle = 2 * np.pi * np.arange(around) / around
@@ -176,7 +177,7 @@ def test_a_blind_sheet_has_both_and_only_its_key_knows_which(tmp_path):
 
 
 def test_a_hair_beside_a_step_of_the_skin_lies_over_the_step():
-    """Heights over a step in the skin equal the heights over its planes: floor and side."""
+    """Heights near a step in the skin are measured from its nearer plane, the floor or the side."""
     floor = np.array(
         [[[0, 0, 0], [1, 0, 0], [0, 0, -1]], [[1, 0, 0], [1, 0, -1], [0, 0, -1]]], float
     )

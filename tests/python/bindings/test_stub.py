@@ -40,9 +40,9 @@ def settable_of(body: list[ast.stmt]) -> set[str]:
 
 
 def differences(stub: str, module) -> list[str]:
-    """A sentence for each name that only one of both has or describes differently.
+    """A sentence for each name that only the stub or only the module has, or that differs in them.
 
-    A description differs if only one of both is a class, or if a property can be set in only one.
+    A name differs if it is a class in only one of them, or a property that can be set in only one.
 
     Args:
         stub: text of the type stub.

@@ -85,7 +85,7 @@ def test_what_the_version_cannot_hold_is_a_line_each(tmp_path):
     lines = words(done).splitlines()
     assert done.returncode == 0
     assert all(line.startswith("risorius: warning: ") for line in lines)
-    # By the format's table these layers came after 2.3; they are not empty in this file.
+    # These layers of the file are not empty, and were added to the format after version 2.3.
     named = [line.split("has no layer ")[1].split(";")[0] for line in lines]
     assert named == ["rbfb", "rbfe", "jbmd", "twsw", "mlbe"]
     assert "twsw" in risorius.load(out).layers

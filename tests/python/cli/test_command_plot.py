@@ -99,7 +99,8 @@ def chain(**changes) -> risorius.Dna:
 
 
 def test_world_positions_of_a_known_chain():
-    # The root's rotation by 90 degrees about z maps x to y; the middle's about x keeps x.
+    # The rotation of the root by 90 degrees about z maps x to y. The rotation of the middle joint
+    # about x keeps x.
     expected = [[10, 25, 30], [10, 22, 30], [10, 20, 30]]
     np.testing.assert_allclose(skeleton.world_positions(chain()), expected, atol=1e-5)
 

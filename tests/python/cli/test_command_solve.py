@@ -113,7 +113,7 @@ def test_a_file_that_makes_no_sense_is_one_sentence(tmp_path, content, said):
 
 
 def test_a_damaged_file_is_one_sentence_or_read(tmp_path):
-    """NumPy raises various exceptions for flipped bits and cut files; all become one sentence."""
+    """NumPy raises various exceptions for flipped bits and cut files; each becomes one sentence."""
     path = tmp_path / "take.npz"
     np.savez(path, vertices=np.zeros((2, 4, 3)), rate=24.0)
     plain = path.read_bytes()

@@ -41,7 +41,7 @@ def _empty_page(monkeypatch):
 
 
 def parts(page):
-    """The face table of a page, and the unpacked bytes of its other elements by name."""
+    """The JSON element face-table of a page, and name -> unpacked bytes of its other elements."""
     found = {}
     for name, text in ELEMENT.findall(page.decode()):
         found[name] = text
@@ -51,7 +51,12 @@ def parts(page):
 
 
 def unpacked(table, data):
-    """The meshes with their arrays, decoded as in native/web/geometry.js."""
+    """The meshes of a page with their arrays, decoded as native/web/geometry.js decodes them.
+
+    Args:
+        table: the page's element face-table.
+        data: the bytes of all arrays.
+    """
     meshes, at = [], 0
     for about in table["meshes"]:
         own = dict(about)

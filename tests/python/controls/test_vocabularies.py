@@ -31,9 +31,10 @@ def spelled(kind):
     return out
 
 
-# Number of names of each program. The second and third number are not tested. They are from the
-# time before the table of vocabularies: how many names `author` recognised by their words alone,
-# and how many the mapping for clips that knew most of them contained.
+# Program -> three numbers. The first is the number of its names; all of them must be known. The
+# other two are not tested; they show the use of the table of vocabularies. Without this table,
+# `author` recognised the second number of names by their words, and the best mapping for clips
+# contained the third number.
 COUNTS = {
     "arkit": (52, 52, 52), "oculus": (15, 0, 15), "vrchat": (18, 0, 7), "vrm0": (17, 3, 17),
     "vrm1": (18, 3, 18), "vroid": (57, 0, 0), "cc4": (155, 16, 27), "cc3": (108, 6, 13),

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Conversion of axes and units, compared with matrices, the reference reader and posed faces."""
+"""Compares conversions of axes and units with matrices, the reference's reader and posed faces.
+
+The reference is OpenRigLogic, which computed the values of tests/data/golden.
+"""
 
 import gzip
 import itertools
@@ -389,7 +392,7 @@ def test_its_own_system_changes_no_bit(name):
 def test_places_and_signs_come_back_exactly(name):
     dna = load(name)
     source = oracle.system_of(dna)
-    # The JSON of the same file, with -0 written as 0.
+    # This Dna is read from the JSON of the same file, with 0 in place of -0.
     fresh = json.loads(dna.to_json().replace("-0.0,", "0.0,"))
     for target in keeping_order(source, 12, 8):
         arguments = target.arguments()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Compares complete, partial and LOD-filtered loads with values of the reference's reader."""
+"""Compares complete, partial and LOD-filtered loads with values of the reference's reader.
+
+The reference is OpenRigLogic, which computed the values of tests/data/golden.
+"""
 
 import copy
 import zlib

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests LOD filters: the result is a complete file with meshes and motion of the original."""
+"""Tests LOD filters: the result is a complete file with meshes and motion of the original.
+
+The reference in comments is OpenRigLogic, which computed the values of tests/data/golden.
+"""
 
 import numpy as np
 import pytest
@@ -172,7 +175,11 @@ def test_a_selection_that_makes_no_sense_is_refused(lods):
 
 
 def test_lods_past_the_last_are_passed_over_and_repeats_count_once():
-    """The reference's filter also ignores LODs past the last, but counts repeats several times."""
+    """The filter ignores LODs past the last one and repeated LODs.
+
+    The reference's filter also ignores LODs past the last one, but counts a repeated LOD several
+    times.
+    """
     whole = risorius.load(GOLDEN / "core.dna")
     assert whole.filter_lods((1, 65535)).to_bytes() == whole.filter_lods([1, 1]).to_bytes()
     assert whole.filter_lods([1, 0]).to_bytes() == whole.to_bytes()

@@ -10,7 +10,7 @@ import risorius
 from conftest import GOLDEN, SHARED, require_extra
 
 FIXTURES = SHARED / "data" / "fixtures"
-# Minor version in which each layer appeared (docs: dna-format, versions).
+# Layer -> minor version of the format in which the layer appeared.
 SINCE = {
     "desc": 1, "defn": 1, "bhvr": 1, "geom": 1, "mlbh": 3, "rbfb": 4, "jbmd": 4, "twsw": 4,
     "rbfe": 5, "mlbe": 6, "dsce": 7,
@@ -119,7 +119,7 @@ def holds_something(path, name):
 
 
 def layer_bytes(data, name):
-    """The bytes of a layer, found through the file's index (docs: dna-format, container)."""
+    """The bytes of a layer, found through the index at the begin of the file."""
     count = int.from_bytes(data[7:11], "big")
     for i in range(count):
         at = 11 + 16 * i

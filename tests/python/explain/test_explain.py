@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests risorius.explain with the evaluator, the oracle and faces made by hand."""
+"""Compares risorius.explain with the evaluator and with an oracle, also for faces made by hand.
+
+The oracle (oracle.py, oracle_behavior.py) evaluates faces in double precision without native code.
+"""
 
 import json
 

@@ -111,7 +111,13 @@ def test_what_a_killed_writer_left_goes_with_the_next_one_and_a_live_ones_stays(
 
 
 def _staged(target, files):
-    """Write files with `staging` like an external program; raise if none is the target."""
+    """Write files beside a target with `staging`, as an external program would.
+
+    Args:
+        target: path of the file that `staging` puts into its place.
+        files: path relative to the staging folder -> text. Without the target's name, the program
+            fails with RuntimeError.
+    """
     with fileio.staging(target) as made:
         for name, data in files.items():
             path = made.with_name(name) if "/" not in name else made.parent / name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests VRM files and generated bodies: the tables that programs read, and refusals.
+"""Tests VRM files and generated bodies: the tables that programs read, and refused options.
 
 packaging/ship/gameface.sh tests such files in three-vrm, TalkingHead and Blender's VRM reader.
 """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Export of a face on the user's own body: position, the body's meshes and bones, bad files.
+"""Tests the export of a face on a user's body: position, and the body's meshes and bones.
+
+Damaged body files are refused.
 
 packaging/ship/gameface.sh tries three-vrm and the VRM reader of Blender."""
 

@@ -79,7 +79,7 @@ def made(face, tmp_path, *more):
 
 
 def places(face):
-    """The oracle of a face, and the face's vertices at rest in metres."""
+    """The face as read by dna_bytes.py, which evaluates it, and its vertices at rest in metres."""
     oracle = dna_bytes.Face(face.read_bytes())
     return oracle, oracle.vertices({}) / 100
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests processing steps of clips; each is compared with a formula."""
+"""Tests the processing steps of clips, such as smoothing. Each step is compared with a formula."""
 
 from __future__ import annotations
 

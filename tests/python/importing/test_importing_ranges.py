@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Values in other scales and head rotations in degrees are refused with a question.
+"""Tests that values in other scales, and head rotations in degrees, are refused.
 
-Options of the import convert them.
+The error asks for the option of the import that converts them.
 """
 
 from __future__ import annotations

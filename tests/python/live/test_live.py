@@ -85,7 +85,8 @@ def test_every_curve_of_a_packet_has_its_name():
     values = [(n + 1) / 100.0 for n in range(61)]
     packet = livelink.decode(packed(v6(1, values)))
     assert np.allclose(packet.values[:52], values[:52])
-    # In the app, angles to the face's right, down and left shoulder are positive.
+    # In the app, a positive angle turns the head to its right, nods it down, or tilts it to its
+    # left shoulder.
     assert np.allclose(packet.values[52:55], [-0.53, -0.54, 0.55])
 
 

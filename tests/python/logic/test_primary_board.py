@@ -91,7 +91,10 @@ def test_halves_of_an_axis_add_up_and_are_found_again(table: Any, labels: list[s
 
 
 def test_two_handles_that_lead_to_one_control_make_room_for_each_other(table: Any) -> None:
-    """A fit finds both handles again if one end of a brow is raised and the other end lowered."""
+    """One end of a brow is raised and the other end lowered, by handles that share a control.
+
+    A fit to the resulting raw controls finds the values of both handles again.
+    """
     names = [f"face_L_brow_{end}.ty" for end in ("inner", "outer")]
     inner, outer = (table.names.index(name) for name in names)
     for up, down in ((inner, outer), (outer, inner)):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tests results of packaging scripts: wheels' names in the zip, version matrix, progress."""
+"""Tests scripts of packaging/.
+
+Examples: names of wheels in the zip, the table of versions, and lines on the progress of films.
+"""
 
 import importlib.util
 import os

@@ -39,7 +39,8 @@ def test_without_the_wheel_the_command_asks_for_it(tmp_path, monkeypatch, capsys
     assert said.startswith("risorius: the wheel risorius-people is not installed")
     assert f"risorius-people {risorius.__version__}" in said
     assert not face.exists()
-    # Other commands work without the wheel; this one fails because of its argument.
+    # Other commands work without the wheel. `info` fails here only because its argument is a
+    # folder.
     assert main(["info", str(tmp_path)]) == 1
     assert "people" not in capsys.readouterr().err
 

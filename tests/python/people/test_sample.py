@@ -296,7 +296,10 @@ def lips_apart(dna, *poses):
 
 
 def _takes(*values):
-    """For each (jawOpen, mouthClose) of a capture, the rig's controls without prefix."""
+    """Yields the rig's controls that a capture with each (jawOpen, mouthClose) gives.
+
+    They are a dict: name of the control without prefix -> value.
+    """
     for jaw, close in values:
         curves = {"jawOpen": ([0.0], [jaw]), "mouthClose": ([0.0], [close])}
         clip, _ = importing.import_curves(curves)

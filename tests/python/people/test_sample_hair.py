@@ -119,7 +119,7 @@ def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
 
 
 def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
-    """If a hair bends back over its root, left and right of its card must not swap."""
+    """If a hair bends back over its root, the left and right edge of its card must not swap."""
     roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(3))
     roots = roots.taken(np.arange(1))
     points = np.array([[[0, 0, 0], [0.1, 0, 0.1], [0.1, 0, 0.3], [-0.1, 0, 0.3], [-0.3, 0, 0.2]]])
@@ -166,9 +166,10 @@ def test_an_eased_guide_goes_to_and_fro_no_more_and_keeps_its_ends():
 
 
 def test_a_shape_that_turns_the_skin_turns_what_stands_on_it():
-    """Hair of 5 mm length rotates with the skin; 20 mm long hair moves only as far as 8 mm long.
+    """A hair vertex 5 mm above the skin rotates with the skin.
 
-    Lengths in the code are in centimetres.
+    A vertex 20 mm above the skin moves only as far as a vertex 8 mm above it. Lengths in the code
+    are in centimetres.
     """
     grid = np.array([[x, 0.0, z] for x in range(5) for z in range(5)], float)
     faces = [[5 * i + j, 5 * i + j + 1, 5 * i + j + 6, 5 * i + j + 5] for i, j in np.ndindex(4, 4)]

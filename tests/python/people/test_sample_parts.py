@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Teeth, lips and shirt of the sample people, and differences between the left and right side.
+"""Tests teeth, lips and shirt of the sample people, and differences of their left and right side.
 
 Tests of the real data are skipped if the data are missing.
 """

@@ -65,7 +65,8 @@ def test_skin_folds_as_far_as_it_is_pushed_together(sheet, share):
     found = folds(sheet, np.diag([1 - share, 1, 1]))
     expected = (share - wrinkles._LEAST) / (wrinkles._FULL - wrinkles._LEAST)
     np.testing.assert_allclose(found[:, 0], expected, atol=1e-9)
-    # Lines of folds are perpendicular to the compression: only yy of the tensor is not 0.
+    # The columns 1 to 3 are xx, xy and yy of the tensor of the folds' direction. Folds run
+    # perpendicular to the compression along x, so only yy is not 0.
     np.testing.assert_allclose(found[:, 3], expected, atol=1e-9)
     np.testing.assert_allclose(found[:, 1:3], 0, atol=1e-9)
 

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""DirectFace computes final vertices like the oracle, writes only changes, refuses bad input."""
+"""Tests DirectFace: its final vertices equal those of an oracle, and bad input is refused.
+
+The oracle is skin_oracle.py, which computes skinning in double precision. Only meshes that have
+changed are written.
+"""
 
 import re
 import sys
@@ -14,7 +18,7 @@ TURN = np.array([[0.9238795, 0.0, 0.3826834, 0.0]], np.float32)  # 45 degrees ab
 
 
 class Face:
-    """The oracle's face, its six joints as bones in another order, and an additional root bone."""
+    """The face of skin_oracle.py with its six joints as bones in another order, and a root bone."""
 
     ROWS = (3, 0, 6, 1, 5, 4)
     OTHER = 2  # no joint of the file: a root above all others

@@ -321,7 +321,8 @@ def turning_face(*groups):
 
 COARSE, FINE = [0, 0, 20], [[30, 0, 10], [0, 25, 5]]
 TURNING = {
-    # If both groups became one, the rotation of control 3, which both LODs have, would come first.
+    # If both groups were joined, the rotation of control 3, which both LODs have, would be applied
+    # first.
     "apart": [([1, 1], [3], [4], [[20]]), ([2, 0], [1, 2, 3], [12, 13], FINE)],
     "together": [([3, 1], [1, 2, 3], [4, 12, 13], [COARSE, *FINE])],
     # Angles of one joint belong to different LODs, so that the order of its columns must not

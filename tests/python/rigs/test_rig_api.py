@@ -75,7 +75,8 @@ def test_faces_in_turn_and_in_threads_do_not_see_each_other(dna):
         one.joint_groups = groups
         rigs.append(risorius.Rig(one))
     raw = np.float32([0.5, 0.25, 0, 1])
-    # A batch uses other memory than single frames, so that its values are correct in any case.
+    # The wanted values are from batches, which use other memory than single frames, so a fault in
+    # the memory of single frames cannot change them.
     wanted = [rig.evaluate_batch(raw[None]).joints[0] for rig in rigs]
     assert not np.array_equal(wanted[0], wanted[1])
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Compares networks, solvers, setups and quaternions with the reference's values at every LOD.
+"""Compares networks, RBF solvers, twist and swing setups, and quaternions with the reference.
+
+Each LOD is compared. The reference is OpenRigLogic, which computed the values of tests/data/golden.
 
 Values in which the reference is known to deviate are not compared:
 
@@ -161,7 +163,7 @@ class Face:
         sure = np.nonzero(~vague)[0]
         a, b = self.quaternions(actual[sure]), self.quaternions(wanted[sure])
         error = np.minimum(np.abs(a - b).max(1), np.abs(a + b).max(1))
-        # if the cosine of the middle Euler angle is near 0, half of the digits are lost
+        # If the cosine of the middle Euler angle is near 0, half of the digits are lost.
         pole = np.where(self.near_pole(wanted[sure]), 1e-3, 0)
         bad = np.nonzero(error > 0.5 * scale * bounds[sure, 3:6].sum(1) + 5e-6 + pole)[0]
         assert bad.size == 0, (

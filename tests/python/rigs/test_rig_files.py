@@ -266,7 +266,10 @@ def test_a_refused_frame_leaves_an_instance_as_it_was(rig):
 
 
 def test_nan_spoils_what_its_control_drives_and_nothing_else(rig):
-    """By the DNA's lists, outputs that depend on the control may be NaN; others stay equal."""
+    """Outputs that depend on the NaN control by the lists of the DNA file may be NaN.
+
+    All other outputs stay equal.
+    """
     dna = risorius.load(GOLDEN / "medium.dna")
     rig = risorius.Rig(dna)
     raw = np.full(len(rig.raw_control_names), 0.25, np.float32)

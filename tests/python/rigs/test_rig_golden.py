@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Compares the evaluator at every LOD with values of an independent implementation."""
+"""Compares the evaluator at every LOD with values of an independent implementation.
+
+The reference is OpenRigLogic, which computed the values of tests/data/golden. The oracle is
+tests/python/support/oracle.py, which evaluates a file in double precision.
+"""
 
 import gzip
 import json

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Compares random faces with the double precision oracle, at sizes around the SIMD widths."""
+"""Compares random faces with oracle.py, which evaluates in double precision.
+
+The sizes of the faces are near multiples of the SIMD widths.
+"""
 
 import numpy as np
 import oracle

@@ -2,7 +2,8 @@
 """Tests settled poses of random chains of correctives, networks and solvers.
 
 Most nodes are read by nodes that a frame evaluates earlier, so that a pose settles only after
-several frames. The expected pose is a frame of the oracle, repeated until nothing changes.
+several frames. The expected pose is computed by oracle_behavior.py in double precision: it repeats
+a frame until no control changes.
 """
 
 import numpy as np
@@ -38,7 +39,7 @@ class Chain:
             number = int(numbers[kind].pop())
             width = 1 if kind == "corrective" else 2
             outputs = [first[kind] + number * width + i for i in range(width)]
-            # the previous node is always read, so that all nodes form one chain
+            # Each node reads the previous node, so all nodes form one chain.
             inputs = [readable[-1], *rng.choice(readable[:-1], 2, replace=False).tolist()]
             self.nodes.append((kind, number, inputs, outputs))
             readable += outputs
@@ -64,7 +65,11 @@ def network(rng, inputs, outputs):
 
 
 def graph(networks):
-    """Networks as a graph of operations: one set gathers inputs, one runs, one writes outputs."""
+    """Networks as a graph of three sets of operations.
+
+    The first set gathers the inputs of the networks, the second runs the networks, and the third
+    writes their outputs.
+    """
 
     def operation(kind, parameters, before):
         return risorius.MlOperation(

@@ -54,7 +54,8 @@ def test_it_is_the_same_speech(voice, monkeypatch):
     options = {"seed": 3, "rate": 30.0, "library": {"aa": own}}
     wanted = speak(voice, WORDS, **options)
     assert "CTRL_expressions.open_A" in wanted.names
-    # The other process does not depend on this one, even if this one cannot import the recogniser.
+    # The process of the recogniser does not depend on this process: it works even if this process
+    # cannot import the recogniser.
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     with pytest.raises(MissingError):
         speak(voice, WORDS)
@@ -91,7 +92,7 @@ def test_another_libpocketsphinx_in_this_process_does_not_matter(voice, tmp_path
     done = limits.run(command, 120)
     said = done.stdout.splitlines()
     assert said[-1:] == ["apart: aligned"], done.stderr
-    # The libraries do clash: recognition in the process that loads both fails.
+    # The two libraries cannot be used together: in a process that loads both, recognition fails.
     assert said[:1] == ["in one process: RuntimeError"]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions that replace the work of batch workers in tests: slow work, failing workers."""
+"""Functions that replace the work of batch workers in tests: they are slow or kill the worker."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def slow(job, threads=1):
 
 
 def deadly(job, threads=1):
-    """Work that kills its worker in the middle of writing a file, if the clip is named deadly."""
+    """Run a job. If its clip is named deadly, kill this worker in the middle of writing a file."""
     if job.clip.stem == "deadly":
         path = job.outputs[0][1]
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -31,7 +31,10 @@ def deadly(job, threads=1):
 
 
 def deadly_once(job, threads=1):
-    """Work that kills only the first worker that gets a clip named deadly, even of two at once."""
+    """Run a job, but kill the first worker that gets a clip named deadly.
+
+    Only one worker is killed, even if two get such a clip at once.
+    """
     if job.clip.stem == "deadly":
         with contextlib.suppress(FileExistsError):
             job.clip.with_suffix(".mark").touch(exist_ok=False)

@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 
-# bone -> parent, then metres to the left, up, and to the front, from the origin
+# Bone -> (parent, metres to the left, metres up, metres to the front); from the origin.
 BONES = {
     "Hips": ("", 0, 1.0, 0), "Spine": ("Hips", 0, 1.1, 0), "Spine1": ("Spine", 0, 1.25, 0),
     "Neck": ("Spine1", 0, 1.5, 0), "Head": ("Neck", 0, 1.6, 0.02),
@@ -28,11 +28,20 @@ TURN = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]])  # as exporters rotate a s
 
 
 class BodyFile:
-    """A body file. shown: name of a mesh -> its vertices at rest in metres, float64[V, 3]."""
+    """A body file.
+
+    Attributes:
+        shown: name of a mesh -> its vertices at rest in metres, float64[V, 3].
+    """
 
     def __init__(self, *, unit=1.0, back=False, eyes=False, prefix="mixamorig:"):
-        """unit: length of a unit in metres; back: the body looks along -z; eyes: add eye bones;
-        prefix: beginning of the names of bones.
+        """Make a body.
+
+        Args:
+            unit: length of the file's unit in metres.
+            back: the body looks along -z instead of +z.
+            eyes: add eye bones.
+            prefix: beginning of the names of bones.
         """
         self.json = {"asset": {"version": "2.0"}, "nodes": [], "accessors": [], "bufferViews": [],
                      "meshes": [], "skins": [], "scene": 0, "scenes": [{"nodes": [0]}]}  # fmt: skip

@@ -91,12 +91,15 @@ def rotation(system, angles):
 
 
 def mapped_rotation(c, matrices):
-    """Rotation matrices R in the target axes of change(): transpose(C) R C."""
+    """Rotation matrices R converted to the target axes: transpose(C) R C; `c` is from change()."""
     return c.T @ matrices @ c
 
 
 def order_stays(source, target):
-    """Whether both systems rotate about the same axes in the same order: angles map one to one."""
+    """Whether both systems rotate about the same axes in the same order.
+
+    Then each angle of one system corresponds to one angle of the other system.
+    """
     c = change(source, target)
     moved = ["xyz"[int(np.argmax(np.abs(c["xyz".index(a)])))] for a in source.rotation_sequence]
     return "".join(moved) == target.rotation_sequence

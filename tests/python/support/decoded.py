@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Converts a Dna to the JSON form of the reference's golden files, by index or by name.
 
-A LOD filter of the reference does not renumber some indices of the complete file, so filtered files
-are compared by the names of the elements.
+The reference is OpenRigLogic, which computed the values of tests/data/golden. Its
+LOD filter does not renumber some indices of the complete file, so filtered files are compared by
+the names of the elements.
 """
 
 import gzip
@@ -415,7 +416,14 @@ def _group_by_name(g, own):
 
 
 def _outputs_by_name(behavior, name, old, kept):
-    """For each LOD, the entries whose output is in `kept`, with names of outputs, not indices."""
+    """For each LOD, the entries of a table whose output is in `kept`, with names of outputs.
+
+    Args:
+        behavior: the decoded layer.
+        name: beginning of the names of the table's fields.
+        old: names of the outputs by index.
+        kept: names of the outputs that remain.
+    """
     fields = [
         k
         for k in behavior
@@ -443,7 +451,11 @@ def _mesh_by_name(m, own, old):
 
 
 def _operations_by_name(ext, own, old):
-    """Operations with networks in place of their indices; joint outputs as [name, attribute]."""
+    """The decoded layer machineLearnedBehaviorExt without indices of networks and joints.
+
+    Operations contain the networks in place of their indices; joint outputs are [name of the joint,
+    attribute].
+    """
     mlp = 3
     width = stride(ext["jointsParameterKeys"], ext["jointsParameterValues"])
     types = [

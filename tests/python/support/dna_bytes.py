@@ -132,7 +132,13 @@ class Face:
         self._ends("geom", c)
 
     def _controls(self, raw):
-        """All controls: raw controls (others 0), then correctives as clamped products of inputs."""
+        """float64: the values of the raw controls, then of the correctives.
+
+        A corrective is the product of its weighted factors, clamped to 0..1.
+
+        Args:
+            raw: raw control -> value; all others are 0.
+        """
         out = np.zeros(len(self.raw) + self.correctives)
         for name, value in raw.items():
             out[self.raw.index(name)] = value

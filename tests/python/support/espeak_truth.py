@@ -141,7 +141,10 @@ def say(text: str, voice: str = "en-us", speed: int = 175, pitch: int = 50) -> S
 
 
 def _with_closures(samples, rate, names, times):
-    """Begins of sounds in seconds; a stop includes the silence before it, except after a pause."""
+    """`times` with earlier begins of stops, in seconds.
+
+    A stop begins with the silence before it, unless the sound before it is a pause.
+    """
     moved = list(times)
     for i in range(1, len(names)):
         if names[i] in STOPS and CLASS_OF[names[i - 1]] != "sil":

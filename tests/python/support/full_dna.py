@@ -184,7 +184,7 @@ def settable(owner: Any) -> list[str]:
 
 
 def fields(owner: Any, path: tuple[Step, ...] = ()) -> Iterator[tuple[tuple[Step, ...], Any]]:
-    """(path, value) of every settable property, including nested ones."""
+    """(path, value) of every property that can be set, including properties of nested objects."""
     for name in settable(owner):
         value = getattr(owner, name)
         yield (*path, name), value

@@ -76,7 +76,7 @@ class Posed:
         return {mesh: self._own(mesh, raw)[where] for mesh, where in self._where.items()}
 
     def raws_of(self, take):
-        """float32[frames, R]: raw controls of a take, by the mapping of imported ARKit clips."""
+        """float32[frames, R]: raw controls of a take, by the importer's mapping `arkit`."""
         clip, _ = importing.import_file(take, self.rig.raw_control_names, mapping="arkit")
         raws = np.tile(self.rig.initial_raw_controls, (clip.frame_count, 1))
         column = {name: i for i, name in enumerate(self.rig.raw_control_names)}

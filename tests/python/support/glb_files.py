@@ -111,7 +111,8 @@ def world(points):
 
 
 def egg(path, *, sparse=True, change=None, matrices=None):
-    """Write the head of face_shapes as two primitives; the second one uses duplicated vertices.
+    """Write the head of face_shapes as two primitives. The second primitive has duplicated
+    vertices.
 
     Args:
         path: path of the GLB.

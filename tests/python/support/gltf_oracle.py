@@ -38,8 +38,9 @@ class GlbFile:
         return self.binary[begin : begin + view["byteLength"]]
 
     def numbers(self, number):
-        """Values of an accessor, float64[n, k]; checked against min and max if the file states
-        them.
+        """Values of an accessor, float64[n, k].
+
+        Fails if the file states other least and largest values (min, max) than its data have.
         """
         about = self.json["accessors"][number]
         kind, width = np.dtype(_KINDS[about["componentType"]]), _WIDTHS[about["type"]]

@@ -53,7 +53,7 @@ def build() -> risorius.Dna:
 
 
 def _skin_places(positions):
-    """Places of skin joints: pairs on both sides, four on the middle line, one above these."""
+    """Places of skin joints: pairs on both sides, four on the middle line, one above these four."""
     grid = positions.reshape(face_shapes.DOWN, face_shapes.ACROSS, 3)
     right = grid[2::4, 1:11:2].reshape(-1, 3)[:24]
     middle = grid[2::5, face_shapes.ACROSS // 2][:4]
@@ -112,8 +112,9 @@ def _meshes(dna, positions, places, moved):
 def _behavior(dna, positions, skin, moved, raw):
     names, first = list(moved), len(NAMED)
     dna.gui_to_raw = _ramp(range(len(names)), range(len(names)))
-    # Correctives with two or three factors. The sixth and the seventh also have the factors of an
-    # earlier one, the eighth reads a corrective, and the ninth reads the pose of a solver.
+    # Nine correctives with two or three factors. The sixth and the seventh have all factors of an
+    # earlier corrective and one more. The eighth reads a corrective, the ninth the pose of a
+    # solver.
     on = [(0, 1), (2, 3), (4, 5), (0, 2), (1, 3), (0, 1, 6), (2, 3, 6), (raw + 1, 4), (raw + 9, 6)]
     dna.psd_count = len(on)
     dna.psds = risorius.Psds(

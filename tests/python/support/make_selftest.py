@@ -3,9 +3,10 @@
 
     python tests/python/support/make_selftest.py
 
-For each face of COMES_FROM, stores the reference's values for some of its cases at every LOD. Cases
-that the reference is known to evaluate differently (test_rig_behavior.py explains them) are
-omitted. Their number is printed; a larger number than before indicates a mistake in Risorius.
+The reference is OpenRigLogic, which computed the values of tests/data/golden. For each face of
+COMES_FROM, stores the reference's values for some of its cases at every LOD. Cases that the
+reference is known to evaluate differently (test_rig_behavior.py explains them) are omitted, and
+their number is printed. If a later run omits more cases, Risorius has a new fault.
 """
 
 import hashlib
@@ -30,7 +31,7 @@ CASES = 12  # per face, at least; evenly spread over its golden cases
 
 
 def rows_of(name):
-    """Float32 rows (lod, raw, joints, shapes, maps) of golden cases, and the number omitted."""
+    """Golden cases as float32 rows (lod, raw, joints, shapes, maps); and the number omitted."""
     dna = risorius.load(SOURCE / f"{name}.dna")
     rig = risorius.Rig(dna, simd="scalar")
     golden = Golden(SOURCE, name)

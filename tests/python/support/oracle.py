@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Evaluates DNA files in double precision, directly by the semantics of the format.
 
-It shares no code with the native evaluator and does not optimise. For each value it also returns a
-bound of the float32 error. A sum of n products k x, rounded in any order, errs by at most
-(n + 1) * eps * sum|k x|. The inputs of a sum are correctives, whose relative error is already
-(number of factors + 1) * eps.
+It shares no code with the native evaluator and does not optimise. The reference is OpenRigLogic,
+which computed the values of tests/data/golden.
+
+For each value this module also returns a bound of the float32 error. A sum of n products k x,
+rounded in any order, errs by at most (n + 1) * eps * sum|k x|. The inputs of a sum are correctives,
+whose relative error is already (number of factors + 1) * eps.
 """
 
 import numpy as np

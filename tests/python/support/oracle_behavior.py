@@ -179,8 +179,8 @@ def reduced(q, method, axis):
         return twist / length
     if length == 0:
         return q
-    # the swing is q times the inverse of its twist; its sign is opposite, which is the same
-    # rotation
+    # The swing is q times the inverse of its twist. All four numbers are negated, which gives the
+    # same rotation.
     return -multiply(q, conjugate(twist)) / length
 
 
@@ -293,10 +293,16 @@ def used_controls(dna, lod):
 
 
 def settled(dna, solvers, raw, lod, count):
-    """Controls after the frame has been repeated until it changes no control; `count`: their
-    number.
+    """Values of all controls after the frame has been repeated until it changes no control.
 
-    Raises an AssertionError if they still change after count + 2 frames.
+    Raises an AssertionError if controls still change after count + 2 frames.
+
+    Args:
+        dna: the face.
+        solvers: its RBF solvers.
+        raw: values of the raw controls.
+        lod: the LOD.
+        count: number of all controls.
     """
     c = initial_controls(dna, count)
     for _ in range(count + 2):
@@ -320,7 +326,15 @@ def ml_stride(dna):
 
 
 def blended(dna, group, joint, controls, order):
-    """Quaternion of a joint: the product of the rotations of its group's columns in this order."""
+    """The quaternion of a joint: the product of the rotations of its group's columns.
+
+    Args:
+        dna: the face.
+        group: the joint group.
+        joint: index of the joint.
+        controls: values of all controls.
+        order: columns of the group in the order of the product.
+    """
     matrix, outputs = np.asarray(group.values, float), np.asarray(group.output_indices)
     total = np.array([0, 0, 0, 1.0])
     for column in order:
@@ -349,7 +363,7 @@ def toward_identity(q, weight):
 
 
 def twist_swing_rotations(dna, c):
-    """Joint index -> quaternion of its twist or swing setup."""
+    """Joint index -> quaternion that a twist or swing setup gives the joint."""
     out = {}
     layer = dna.twist_swing_behavior
     swung = [s.input_control_indices.tolist() for s in layer.swings]

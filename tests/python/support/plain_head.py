@@ -61,7 +61,7 @@ def mask(short=0.3, apart=0.2, *, painted=False):
 
 
 def _over_eye(points, side):
-    """Move skin in front of an eye at least 0.6 mm outside of the eyeball."""
+    """The points, of which those in front of an eye are moved to at least 0.6 mm outside of it."""
     middle = EYE * [side, 1, 1]
     flat = points[:, :2] - middle[:2]
     inside = np.maximum((1.05 * RADIUS) ** 2 - (flat**2).sum(axis=1), 0)

@@ -52,8 +52,8 @@ def straight(frames: Float, values: Float) -> Bezier:
 class _Basis(NamedTuple):
     """Values of the cubic Bernstein polynomials for the fit of one cubic to a range of samples.
 
-    Except `solve`, each is float64[m]: values at all samples except the first and the last one,
-    then at the midpoints between neighbouring samples.
+    The attributes near, far, begin and end are float64[m]: values at all samples except the first
+    and the last one, then at the midpoints between neighbouring samples.
 
     Attributes:
         near, far: weights of the values of the first and of the second handle.
@@ -76,7 +76,7 @@ class Fitter:
     """
 
     def __init__(self, tolerance: float) -> None:
-        """Prepare fits.
+        """Make a fitter with empty caches.
 
         Args:
             tolerance: largest difference of a curve's value from a sample, above 0.
@@ -100,7 +100,8 @@ class Fitter:
             Bezier; each key has the value of its sample. If all samples are within the tolerance
             of the first sample, the curve has one key.
         """
-        # A left and a right control often have equal samples.
+        # Results are cached by their samples, because a left and a right control often have equal
+        # samples.
         known = frames.tobytes(), values.tobytes()
         if known not in self._done:
             self._done[known] = self._fit(frames, values)

@@ -16,7 +16,8 @@ Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 NECK = ("neck.yaw", "neck.pitch", "neck.roll")
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
-# Offset of the gaze target from its rest place, in Blender units and in the axes of its bone.
+# Names of a clip's curves with the offset of the gaze target from its rest place, in Blender units
+# and in the axes of the target's bone.
 TARGET = ("eyes.x", "eyes.y", "eyes.z")
 TURNS = {"head": HEAD, "neck": NECK, **{f"eye_{side}": names for side, names in EYES.items()}}
 BONES = (*(name for names in TURNS.values() for name in names), *TARGET)  # curves that move bones
@@ -35,7 +36,8 @@ class Timing:
         rate: frames per second of the scene, fps / fps_base.
         start: frame of the scene at the clip's time `origin`.
         origin: time in seconds on the clip's clock.
-        whole: True: keys are placed on whole frames only, see onto_frames.
+        whole: True: keys are placed on whole frames of the scene only. A sample between two whole
+            frames gives a key on each of them.
     """
 
     rate: float
@@ -147,7 +149,7 @@ def keys_of(
         curves: float32[names, frames].
         times: float64[frames], seconds, ascending.
         timing: conversion from the clip's time to frames of the scene.
-        sliders: curve name -> property name, see property_names.
+        sliders: name of a clip's curve -> property name of the slider that the curve drives.
         with_eyes: True: curves of eye rotation become keys too.
 
     Returns:
@@ -240,7 +242,14 @@ def quaternions(angles: Float) -> Float:
 
 
 def angles_of(turns: Float) -> Float:
-    """The inverse of `quaternions`. Returns: float64[n, 3], yaw, pitch and roll in radians."""
+    """The inverse of `quaternions`: the angles of rotations of a head, a neck or an eye.
+
+    Args:
+        turns: float64[n, 4], unit quaternions, w first.
+
+    Returns:
+        float64[n, 3], yaw, pitch and roll in radians.
+    """
     w, x, y, z = np.moveaxis(np.asarray(turns, np.float64), -1, 0)
     pitch = -np.arcsin(np.clip(2 * (w * x + y * z), -1.0, 1.0))
     yaw = np.arctan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z))

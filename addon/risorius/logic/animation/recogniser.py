@@ -4,7 +4,8 @@
 import re
 
 PACKAGE = "pocketsphinx==5.1.1"
-# SHA-256 of the accepted wheels of PACKAGE for Blender's Python versions; pip rejects other files.
+# SHA-256 hashes of the accepted wheels of the speech recognition package, for the Python versions
+# of Blender; pip rejects other files.
 HASHES = (
     "bb8fd0fc7fb08dd8f85da21f5121f34ebf4186a5bee91ce85e2d358e69a448bf",  # cp311, Linux x86_64
     "4742dc42c010caf5a2558cac910b0856d85c94e9bb0357ed4ff32f1f0d0837f9",  # cp311, Linux aarch64

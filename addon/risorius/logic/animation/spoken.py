@@ -158,8 +158,8 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
 
     Args:
         sounds: the list.
-        begin: frame at which the sound begins; moved if the sound or the one before it would last
-            less than SHORTEST.
+        begin: frame at which the sound begins; moved if the sound or the sound before it would
+            last less than SHORTEST, a quarter of a frame.
         name: phoneme of the sound.
         end: frame at which the list ends.
 
@@ -253,7 +253,7 @@ def label_of(sound: Sound, mouth: str) -> str:
 
     Args:
         sound: the sound of the marker.
-        mouth: name of its mouth shape, such as M B P.
+        mouth: name of the sound's mouth shape, such as "M B P" for the sounds M, B and P.
     """
     return f"{sound.word}: {mouth}" if sound.word else mouth
 

@@ -11,7 +11,12 @@ PREFIX = "CTRL_expressions."  # prefix of raw controls in a standard DNA file
 
 
 class WrittenRow(TypedDict):
-    """A row of the table with the descriptions of controls."""
+    """A row of the table that describes controls.
+
+    Attributes:
+        does: a sentence: the effect of the control.
+        words: words by which the control is found.
+    """
 
     does: str
     words: list[str]

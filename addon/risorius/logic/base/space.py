@@ -91,7 +91,9 @@ class Space:
 
     @property
     def delta_matrix(self) -> NDArray[np.float32]:
-        """float32[3, 3] that converts a shape delta from file units to Blender units."""
+        """float32[3, 3]: the matrix that converts a shape delta from the file's axes and units to
+        Blender's.
+        """
         return np.ascontiguousarray(self.axes * self.scale, np.float32)
 
 

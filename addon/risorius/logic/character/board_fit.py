@@ -28,7 +28,7 @@ _REST = 1e-10  # cost per unit of distance from rest: decides between equally go
 
 @dataclass(frozen=True)
 class Loss:
-    """The accuracy of a conversion: the raw controls that differ most.
+    """The accuracy of a conversion of raw controls to GUI controls and back.
 
     Attributes:
         largest: largest difference of a converted raw control from its wanted value, in any pose.

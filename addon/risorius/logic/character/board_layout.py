@@ -198,7 +198,13 @@ _LIP = re.compile(r"[UD]$")
 
 @dataclass
 class _Cell:
-    """Handles above a common label, each with the offset from the cell's upper left corner."""
+    """Handles of a board above a common label.
+
+    Attributes:
+        width, height: size in board units.
+        label: the lines of the label.
+        inside: (handle, x, y): each handle with its offset from the cell's upper left corner.
+    """
 
     width: float
     height: float
@@ -217,7 +223,7 @@ class _Block:
 
 
 def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
-    """Whether the handle of a GUI control moves sideways.
+    """Whether the handle of a GUI control moves left and right on the board.
 
     Args:
         table: the GUI controls.
@@ -285,7 +291,7 @@ def handles_of(
 
     Args:
         table: the GUI controls.
-        ways: direction of each GUI control, from ways_of.
+        ways: direction on the board in which each GUI control's handle moves when its value grows.
         region_of: stem of a handle -> region.
         taken: bone names that are in use.
 
@@ -349,8 +355,8 @@ def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool =
     Args:
         handles: handles that are not placed yet.
         titles: region -> title, in the order of the blocks.
-        is_own: True: the table was made from raw controls, so all handles are placed in rows by
-            region.
+        is_own: True: the face's GUI controls were made from names of raw controls, so all handles
+            are placed in rows by region.
     """
     left = list(handles)
     blocks = []
@@ -369,7 +375,12 @@ def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool =
 
 
 def _label(stem: str, region: str) -> list[str]:
-    """The label of a handle, in short lines."""
+    """The label of a handle in upper case, split into short lines.
+
+    Args:
+        stem: name of the handle's bone without prefix and side.
+        region: region of the face to which the handle belongs.
+    """
     words = _LABELS.get(stem.lower()) or slider_words.title_in_region(stem, region, sided=False)
     text = words.upper()
     rows: list[str] = []
@@ -475,7 +486,12 @@ def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block
 
 
 def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
-    """Distribute cells evenly over as few rows as fit into a width."""
+    """Distribute cells over the smallest number of rows, so that the rows have similar widths.
+
+    Args:
+        cells: the cells of a block, in their order.
+        width: largest width of a row, in board units.
+    """
     total = sum(cell.width + _GAP for cell in cells)
     share = total / max(1.0, np.ceil(total / width))
     rows: list[list[_Cell]] = [[]]
@@ -490,7 +506,7 @@ def _rows_of(cells: Sequence[_Cell], width: float) -> list[list[_Cell]]:
 
 
 def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
-    """Make a cell for each stem of handles; tall cells are last.
+    """Make a cell for each stem of handles. The cells are sorted by height, the lowest first.
 
     Short handles on a side of the face whose stems differ only in a final U or D, for the upper and
     the lower lip, share a cell.
@@ -513,7 +529,12 @@ def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
 
 
 def _shelves(blocks: Sequence[_Block], width: float) -> list[list[_Block]]:
-    """Arrange blocks in rows up to a given width."""
+    """Arrange blocks in rows; each row gets as many of the next blocks as fit into it.
+
+    Args:
+        blocks: the blocks, in their order.
+        width: largest width of a row, in board units.
+    """
     rows: list[list[_Block]] = []
     for block in blocks:
         taken = sum(b.width + 2 * _MARGIN for b in rows[-1]) if rows else width
@@ -525,7 +546,12 @@ def _shelves(blocks: Sequence[_Block], width: float) -> list[list[_Block]]:
 
 
 def _drawn(rows: Sequence[Sequence[_Block]], width: float) -> Board:
-    """Make a centred board of rows of blocks: places of handles, and all lines."""
+    """Make the board from its rows of blocks: compute the places of handles, and draw all lines.
+
+    Args:
+        rows: rows of blocks, from the top down.
+        width: width of the board between its margins, in board units.
+    """
     handles: list[Handle] = []
     lines: list[Line] = []
     down = -_MARGIN
@@ -552,7 +578,14 @@ def _drawn(rows: Sequence[Sequence[_Block]], width: float) -> Board:
 
 
 def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Line]) -> None:
-    """Add the handles and lines of a cell whose upper left corner is at x, y."""
+    """Add the handles and lines of a cell to the board.
+
+    Args:
+        cell: the cell.
+        x, y: upper left corner of the cell on the board.
+        handles: receives the handles of the cell, with their places.
+        lines: receives the frames and the label of the cell.
+    """
     for handle, across, down in cell.inside:
         place = (x + across, y + down)
         handles.append(replace(handle, place=place))

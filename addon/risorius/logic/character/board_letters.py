@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 Point = tuple[float, float]
 
-# Letter -> its strokes, separated by commas. A stroke lists its points; two digits are x and y.
+# Letter -> its strokes, separated by commas. A stroke lists its points with spaces between them. A
+# point is two digits, x and y: 06 is x = 0, y = 6.
 _STROKES = {
     "A": "00 05 16 36 45 40,03 43", "B": "00 06 36 45 44 33 03,33 42 41 30 00",
     "C": "45 36 16 05 01 10 30 41", "D": "00 06 26 44 42 20 00", "E": "46 06 00 40,03 33",

@@ -108,13 +108,18 @@ class BoardTable:
         return tuple((a, b) for a, b in pairs if led[a] & led[b] and led[a] != led[b])
 
     def outputs_of(self, gui: int) -> list[int]:
-        """The raw controls that a GUI control drives. Args: gui  index of the GUI control."""
+        """The indices of the raw controls that a GUI control drives.
+
+        Args:
+            gui: index of the GUI control.
+        """
         return [raw for raw, _rows in self._pieces[gui]]
 
     def breaks_of(self, gui: int) -> list[float]:
         """Values of a GUI control at which the range of one of its rows begins or ends, and 0.
 
-        Args: gui  index of the control.
+        Args:
+            gui: index of the control.
         """
         ends = {0.0, float(self.lowest[gui]), float(self.highest[gui])}
         for _raw, rows in self._pieces[gui]:
@@ -154,7 +159,7 @@ class BoardTable:
 
     @cached_property
     def _straight(self) -> tuple[Whole, Whole, Doubles, Doubles, Doubles]:
-        """The fields gui, raw, low, high and slope of all rows as arrays, for own_raw."""
+        """Fields of all rows as five arrays: gui, raw, low, high and slope."""
         rows = self.rows
         numbers = np.array([(row.low, row.high, row.slope) for row in rows], np.float64)
         low, high, slopes = numbers.reshape(-1, 3).T
@@ -162,14 +167,28 @@ class BoardTable:
         return inputs, np.array([row.raw for row in rows], np.intp), low, high, slopes
 
     def own_raw(self, gui: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The raw controls of one pose, for tables with is_own. Args: gui  float32[G]."""
+        """Convert the GUI controls of one pose to raw controls; only for a table with `is_own`.
+
+        Args:
+            gui: float32[G], GUI controls.
+
+        Returns:
+            float32[R] in 0..1.
+        """
         inputs, outputs, low, high, slopes = self._straight
         given = np.clip(gui[inputs], low, high) * slopes
         raw = np.bincount(outputs, given, self.raw_count)
         return np.clip(raw, 0.0, 1.0).astype(np.float32)
 
     def sums(self, gui: Doubles) -> Doubles:
-        """float64[N, R]: raw controls before clamping to 0..1. Args: gui  float64[N, G]."""
+        """Convert GUI controls to raw controls without clamping to 0..1.
+
+        Args:
+            gui: float64[N, G], GUI controls of N poses.
+
+        Returns:
+            float64[N, R].
+        """
         out = np.zeros((len(gui), self.raw_count))
         for index in range(len(self.names)):
             if self._pieces[index]:

@@ -218,7 +218,7 @@ def plan_character(
         fallback_name: used if the file has no name.
         lods: levels of detail to build.
         unit_scale: metres per Blender unit.
-        rests: values of raw controls at rest, see plan_controls.
+        rests: rest value of each raw control; missing values are 0.
 
     Returns:
         The plan; it keeps no reference to `dna`.
@@ -275,7 +275,9 @@ def _mesh_lods(dna: DnaData) -> list[tuple[int, ...]]:
 
 
 def existing_lods(dna: DnaData, wanted: Sequence[int]) -> tuple[int, ...]:
-    """The levels of `wanted` for which the file has meshes, or the file's finest level.
+    """The wanted levels of detail for which the file has meshes.
+
+    If the file has no meshes at any wanted level, the result is the finest level with meshes.
 
     Args:
         dna: the face.
@@ -292,8 +294,9 @@ def plan_controls(
 
     Args:
         raw_names: names of all raw controls.
-        rests: their rest values; missing ones are 0. A rest other than 0 marks the w of a
-            quaternion for the file's solvers: all components of that quaternion range from -1 to 1.
+        rests: rest value of each raw control; missing values are 0. A raw control with a rest value
+            other than 0 is the w component of a joint's rotation (quaternion); the sliders of all
+            four components of this rotation range from -1 to 1, all other sliders from 0.
     """
     labels = names.unique_labels(raw_names)
     values = [float(r) for r in rests] + [0.0] * (len(raw_names) - len(rests))

@@ -34,8 +34,8 @@ def lay_out(table: BoardTable, handles: Sequence[Handle]) -> Board:
     """Draw the board around its handles.
 
     Args:
-        table: from primary_table.table_of.
-        handles: from primary_table.handles_of.
+        table: the GUI controls of the primary board.
+        handles: the handles of the primary board, with their places.
 
     Returns:
         Board with its centre at 0, 0.
@@ -68,7 +68,13 @@ def beside(low: ArrayLike, high: ArrayLike, width: float) -> tuple[list[float], 
 
 
 def _words(text: str, side: str) -> str:
-    """A label; if it names both ends of an axis, their order is reversed on the right side."""
+    """The label of a handle. If the text names both ends of an axis, such as `inwards | outwards`,
+    the order of the ends is reversed for a handle on the character's right side.
+
+    Args:
+        text: label of the handle, as in primary_table.Part.
+        side: "L" or "R" of the character, or "" for the middle.
+    """
     ends = text.split(" | ")
     return "   ".join(reversed(ends) if side == "R" else ends)
 

@@ -180,7 +180,7 @@ def handles_of(
     """Make the handles of the primary board with their places.
 
     Args:
-        table: from table_of.
+        table: the result of table_of.
         sideways: index of a GUI control -> motion of the face to its own left, as a share of the
             whole motion, -1 to 1.
         taken: bone names that are in use.
@@ -206,7 +206,11 @@ def handles_of(
 
 
 def sides_of(table: BoardTable) -> Iterator[tuple[Part, str]]:
-    """The parts whose handles are in a table, each with its side. Args: table  from table_of."""
+    """The parts whose handles are in a table, each with its side.
+
+    Args:
+        table: the result of table_of.
+    """
     there = {name.rpartition(".")[0] for name in table.names}
     for part in PARTS:
         for side in "LR" if part.paired else ("",):

@@ -115,7 +115,7 @@ def mirrored(values: Mapping[str, float], regions: FaceRegions) -> dict[str, flo
         regions: regions of the face.
 
     Returns:
-        The same controls; a control whose partner has no value keeps its value.
+        The new values of the same controls; a control whose partner has no value keeps its value.
     """
     return {name: values.get(regions.mirrored(name), value) for name, value in values.items()}
 

@@ -60,9 +60,10 @@ def title_of_directions(control: str, region: str) -> str:
 
 
 def _without_side(text: str) -> tuple[str, str]:
-    """Split off the side: `Press UL` gives (`Press U`, `L`).
+    """Split a title into the title without its side, and the side: "L", "R", or "" for none.
 
-    `Lips Sticky LPh1` gives (`Lips Sticky Ph1`, `L`).
+    For example, `Press UL` gives (`Press U`, `L`), and `Lips Sticky LPh1` gives
+    (`Lips Sticky Ph1`, `L`).
     """
     found = _SIDE.search(text)
     if not found:

@@ -75,8 +75,9 @@ class Studio:
 
 
 _Row = tuple[str, float, float, float, tuple[float, float], float, Triple]
-# Name, degrees to the viewer's right, degrees up, distance in metres, width and height in metres,
-# light at the face as a share of the key light, colour. The fill light is two stops darker.
+# Each lamp: name, degrees to the viewer's right, degrees up, distance in metres, width and height
+# in metres, light at the face as a share of the key light, linear RGB colour. The fill light is two
+# stops darker than the key light.
 _LAMPS: tuple[_Row, ...] = (
     ("Key", -45.0, 30.0, 1.3, (0.6, 0.6), 1.0, (1.0, 0.925, 0.84)),
     ("Fill", 42.0, 4.0, 2.0, (1.5, 1.5), 0.25, (0.86, 0.93, 1.0)),
@@ -121,7 +122,7 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
 
 
 def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
-    """Height of the picture, and height of its centre above the eyes.
+    """Height of the picture, and height of its centre above the eyes, both in Blender units.
 
     The eyes are a third of the picture's height below its top, unless hair needs more room. The
     picture of a face with a neck ends above the lower end of its mesh; a face without a neck is

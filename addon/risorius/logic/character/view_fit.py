@@ -28,7 +28,7 @@ def distance(radius: float, lens: float, size: Sequence[float], perspective: boo
         perspective: True: perspective view; False: orthographic view.
     """
     longer, shorter = max(*size, 1.0), max(min(size), 1.0)
-    # Half of the extent that the shorter side shows, per unit of distance.
+    # Half of the extent that is visible along the region's shorter side, per unit of distance.
     slope = _HALF / lens * shorter / longer
     share = math.sin(math.atan(slope)) if perspective else slope
     return _MARGIN * radius / max(share, 1e-6)
@@ -69,7 +69,8 @@ def fit(
         perspective: True: perspective view; False: orthographic view.
 
     Returns:
-        Pivot along the view's right and up axes, and the viewer's distance from the pivot.
+        Coordinates of the pivot along the view's right and up axes, and the viewer's distance from
+        the pivot, in the unit of `points`.
     """
     places = np.asarray(points, np.float64)
     room = np.array([free[2] - free[0], free[3] - free[1]]) * _FILLED

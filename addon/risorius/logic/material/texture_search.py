@@ -11,7 +11,8 @@ from pathlib import Path
 from ..base import names
 
 EXTENSIONS = (".png", ".tga", ".exr", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".webp")
-# Folders to search, relative to the DNA file; `{stem}` is its name without extension.
+# Folders to search, relative to the folder of the DNA file; `{stem}` stands for the DNA file's name
+# without extension.
 FOLDERS = (
     "{stem}_textures",
     "Maps",
@@ -71,7 +72,8 @@ _SET = re.compile(r"^([cw]m)([1-9])$")
 _MASK = re.compile(r"^(?:t_)?(head_wm\d+_[a-z]+(?:_[a-z]{1,2})?)(?:_msk|_mask)?$")
 _PACKED = re.compile(r"^(?:t_)?head_(wm\d+)_msk_(\d\d)$")
 
-# Regions in the red, green, blue and alpha channels of each packed mask file.
+# Wrinkle set and number in the name of a packed mask file, such as wm1_01 -> the regions in the
+# file's red, green, blue and alpha channels.
 PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
     "wm1_01": ("blink_L", "blink_R", "browsRaiseInner_L", "browsRaiseInner_R"),
     "wm1_02": ("browsRaiseOuter_L", "browsRaiseOuter_R", "chinRaise_L", "chinRaise_R"),
@@ -260,7 +262,7 @@ def find(
     """Find textures: first the files that the DNA file names, then files with known names.
 
     Args:
-        wanted: (mesh base, role) -> file name, from from_metadata.
+        wanted: (mesh base, role) -> file name that the metadata of the DNA file gives.
         meshes: base name and kind of each mesh.
         folders: folders to search; a match in an earlier folder wins.
 

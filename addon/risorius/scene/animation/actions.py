@@ -20,8 +20,8 @@ from ..base import compat, saved
 from ..base.blender_types import Animated
 
 BEFORE = "risorius_before"  # on a datablock with a baked action: its animation before the bake
-# Custom property that marks a baked action. `restore` removes such an action if nothing else uses
-# it and the user did not edit its keys (see `was_edited`).
+# Custom property that marks a baked action. `restore` removes a marked action if no other datablock
+# uses it and the user did not edit its keys.
 BAKED_ACTION = "risorius_baked_action"
 _DIGEST = "risorius_digest"  # on a baked action: result of `_digest` after the bake
 _LINEAR = 1  # number of Blender's interpolation "LINEAR"
@@ -52,8 +52,14 @@ class Track:
 
 @dataclass
 class Counts:
-    """Totals over the written F-curves: number of keyframes, number of keyframes before the
-    key reduction, largest error of the key reduction, and number of F-curves."""
+    """Totals over all written F-curves.
+
+    Attributes:
+        keys: number of keyframes after the key reduction.
+        all_keys: number of keyframes before the key reduction.
+        error: largest error of the key reduction, in the units of the values.
+        curves: number of F-curves.
+    """
 
     keys: int = 0
     all_keys: int = 0
@@ -361,7 +367,13 @@ def restore(owner: Animated) -> None:
 def _play_again(
     data: bpy.types.AnimData, state: Mapping[str, object], action: bpy.types.Action | None
 ) -> None:
-    """Restore the stored action, slot and blending settings of animation data."""
+    """Restore the stored action, slot and blending settings of animation data.
+
+    Args:
+        data: the animation data of the datablock.
+        state: the settings that `keep` stored.
+        action: the action that was active then, or None.
+    """
     data.action = action
     if action is not None and "slot" in state:
         slot = next((s for s in action.slots if s.identifier == state["slot"]), None)

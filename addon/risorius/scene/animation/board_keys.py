@@ -165,7 +165,12 @@ def animates_sliders(rig: ArmatureObject) -> bool:
 def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
     """Convert the current pose to the board or to the sliders.
 
-    Returns: the changes of raw controls by the conversion; no changes if it was to the sliders.
+    Args:
+        rig: the character.
+        by_board: True: convert to the board; False: convert to the sliders.
+
+    Returns:
+        The changes of raw controls by the conversion; no changes if `by_board` is False.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
@@ -183,7 +188,9 @@ def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
 def _leading_curves(
     action: bpy.types.Action, controls: ArmatureObject, live: runtime.Runtime, of_board: bool
 ) -> Iterable[bpy.types.FCurve]:
-    """The F-curves of the board's handles (of_board), or of the sliders that the board moves."""
+    """The F-curves of an action that move the board's handles if `of_board` is True, or else the
+    F-curves of the sliders that the board moves.
+    """
     if of_board:
         paths = {board.path_of(handle.bone) for handle in live.handles}
     else:

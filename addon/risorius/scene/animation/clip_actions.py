@@ -37,7 +37,8 @@ class Report:
     Attributes:
         action: the new action.
         first, last: first and last frame of the action.
-        curves: number of sliders and bones that the clip moves, with bones that the face lacks.
+        curves: number of sliders and bones that the clip moves, including bones that the face
+            lacks.
         unknown: names of the clip's curves that match no control or bone of this face.
         notes: sentences for the user.
     """
@@ -86,7 +87,11 @@ def timing_of(
 
 
 def sliders_of(live: runtime.Runtime) -> dict[str, str]:
-    """Control name -> name of its slider property. Args: live  the character's Runtime."""
+    """Name of a control in the DNA file, or its label in Blender -> name of its slider property.
+
+    Args:
+        live: the character's Runtime.
+    """
     return clip_units.property_names(live.dna.raw_control_names, live.labels)
 
 
@@ -103,7 +108,7 @@ def make_action(
     Args:
         rig: the character's deforming armature.
         clip: risorius.Clip; curves such as "head.yaw" rotate the bones of head, neck and eyes.
-        timing: frames of the scene at which the clip plays, from timing_of.
+        timing: conversion from the clip's time to frames of the scene.
         name: name of the action.
         with_eyes: animate the eye bones too if the clip has eye rotations.
         tolerance: largest difference of a slider from the clip after the fit of Bezier keys; a
@@ -256,7 +261,13 @@ def _add_turn(
 ) -> None:
     """Add F-curves of a bone's rotation, in the rotation mode of the bone.
 
-    turns: float64[n, 4], quaternions (w x y z) in the armature's axes.
+    Args:
+        bag: receives the F-curves.
+        group: group of the F-curves.
+        bone: bone of the control armature.
+        frames: float64[n], frames of the rotations.
+        turns: float64[n, 4], quaternions (w x y z) in the armature's axes.
+        fitter: fits Bezier keys; None: a linear key for each rotation.
     """
     own = clip_units.near_signs(_into_bone(bone, turns))
     path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
@@ -279,7 +290,13 @@ def _into_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[
 def _as_rotation(mode: str, turns: NDArray[np.float64]) -> NDArray[np.float64]:
     """Convert quaternions float64[n, 4], w x y z, to values of a rotation mode.
 
-    Returns: float64[n, 4], quaternions or angle and axis; float64[n, 3], Euler angles. Radians.
+    Args:
+        mode: a value of PoseBone.rotation_mode.
+        turns: the quaternions.
+
+    Returns:
+        For "QUATERNION" and "AXIS_ANGLE" float64[n, 4]: the quaternions, or angle and axis. For
+        other modes float64[n, 3]: Euler angles. Angles are in radians.
     """
     if mode == "QUATERNION":
         return turns

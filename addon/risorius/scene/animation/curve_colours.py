@@ -42,7 +42,11 @@ def colour_of(region: str, step: int = 0) -> Colour:
 
 
 def label_of(path: str) -> str:
-    """The slider that an F-curve moves, "" for other curves. Args: path  the curve's data path."""
+    """The slider that an F-curve moves, "" for other curves.
+
+    Args:
+        path: the curve's data path.
+    """
     start, _, end = parts.property_path("@").partition("@")
     if not path.startswith(start) or not path.endswith(end):
         return ""

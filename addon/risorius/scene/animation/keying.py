@@ -240,7 +240,7 @@ def key(
         context: has the settings and the frame.
         rig: the character.
         labels: names of the sliders to key.
-        bones: data paths of control bones to key, as in Pose.
+        bones: data paths of the rotations and locations of control bones to key.
 
     Returns:
         The number of keyed properties.
@@ -326,7 +326,21 @@ def _at_selected(
     move: Callable[[], Collection[str] | None],
     at: Callable[[float], object] | None,
 ) -> int:
-    """Do the work of `by_hand` with at_selected: move and key at each frame with a selected key."""
+    """Move controls at every frame with a selected key of the face, and key the changed controls.
+
+    Args:
+        context: has the settings and the current frame.
+        controls: control armature of the face.
+        move: a function that moves sliders and bones from the pose of the frame; it returns None if
+            it did nothing.
+        at: a function that is called with the frame before each move; None: no function.
+
+    Returns:
+        The number of keyed properties.
+
+    Raises:
+        FaceError: no key is selected, or a tweak is active.
+    """
     if tweaks.of(controls) is not None:
         raise FaceError(told("A tweak is on: end it first, or work at the current frame."))
     frames = selected_frames(controls)
@@ -432,7 +446,12 @@ def _driven(controls: ArmatureObject) -> set[str]:
 
 
 def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FCurve]:
-    """The F-curves of a property that was just keyed. F-curves of sliders get a region colour."""
+    """The F-curves of a property that was just keyed; curves of sliders get their region's colour.
+
+    Args:
+        bag: contains the F-curves of the action.
+        path: data path of the property.
+    """
     curves = [c for c in (bag.fcurves.find(path, index=i) for i in range(4)) if c is not None]
     label = curve_colours.label_of(path)
     if label:
@@ -442,7 +461,10 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Set interpolation and handle types of the last key in time, if a curve has at most two."""
+    """Set interpolation and handle types of a curve's last key, if it has at most two keys.
+
+    Blender copies both settings to later keys from the key before.
+    """
     if len(curve.keyframe_points) > 2:
         return  # Blender copied both settings from the previous key
     for key in (

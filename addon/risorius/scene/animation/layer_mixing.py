@@ -178,7 +178,13 @@ def _numbers(bones: Bones) -> NDArray[np.float32]:
 
 
 def _changed(bones: Bones, before: NDArray[np.float32], after: NDArray[np.float32]) -> Bones:
-    """The control bones after mixing. Bones that no layer moves keep their exact values."""
+    """The control bones after mixing. Bones that no layer moves keep their exact values.
+
+    Args:
+        bones: the control bones before mixing.
+        before, after: float32[n], values of the bones before and after mixing, in the order of
+            `clip_units.BONES`.
+    """
     if np.array_equal(before, after):
         return bones
     turns, target, at = dict(bones.turns), bones.target, 0
@@ -223,7 +229,9 @@ def _get(layer: RISORIUS_PG_layer, names: Iterable[str]) -> Iterator[object]:
 
 
 def _key(layer: RISORIUS_PG_layer, rate: float) -> tuple[tuple[object, ...], tuple[object, ...]]:
-    """Cache keys of a layer: the settings that define its curves, the settings of its mask."""
+    """Two keys of the cache for a layer: all settings that determine the layer's curves, and all
+    settings that determine its mask.
+    """
     action = layer.action
     uid = action.session_uid if action is not None else 0
     warp = tuple((point.frame, point.source) for point in layer.warp)
@@ -299,7 +307,12 @@ def _fire(stack: Stack, controls: ArmatureObject, rate: float) -> None:
 
 
 def _set_weights(stack: Stack, weights: tuple[float, ...]) -> None:
-    """Set the weights of the layers, one for each layer in the collection; curves stay compiled."""
+    """Set the weights of compiled layers, whose curves are not compiled again.
+
+    Args:
+        stack: the compiled layers of a character.
+        weights: weight of each layer in the collection of the character's layers.
+    """
     stack.mixer.layers = tuple(
         replace(layer, weight=min(max(weights[place], 0.0), 1.0))
         for layer, place in zip(stack.layers, stack.places, strict=True)
@@ -377,7 +390,8 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
     """The times in seconds, "start" and "end", between which a layer plays a constant pose.
 
-    Without "end" the pose plays for ever; an empty result means at all times.
+    If the result has no "end", the pose plays from "start" for ever. If the result is empty, the
+    pose plays at all times.
     """
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}

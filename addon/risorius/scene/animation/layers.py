@@ -40,7 +40,11 @@ def places(controls: bpy.types.Object) -> bpy.types.bpy_prop_collection_idprop[R
 
 
 def of(controls: bpy.types.Object) -> list[RISORIUS_PG_layer]:
-    """The layers that are not removed, bottom to top. Args: controls  the control armature."""
+    """The layers that are not removed, bottom to top.
+
+    Args:
+        controls: the control armature.
+    """
     return [layer for _place, layer in ordered(controls)]
 
 
@@ -361,7 +365,7 @@ def fire(
 
     Args:
         controls: control armature of the character.
-        name: name of the reaction, see known_reactions.
+        name: name of the reaction, a key of the dict known_reactions().
         frame: frame of the scene; need not be whole.
         strength: 0 to 1, factor on the reaction's values.
 

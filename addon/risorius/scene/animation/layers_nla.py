@@ -100,7 +100,12 @@ def _weight_curve(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> bpy.typ
 
 
 def _push_down(controls: ArmatureObject, rig: ArmatureObject) -> None:
-    """Convert the active action to a strip, like Blender's Push Down Action."""
+    """Convert the active action of a face to a strip, like Blender's operator Push Down Action.
+
+    Args:
+        controls: the control armature of the face.
+        rig: the deforming armature of the face.
+    """
     data = controls.animation_data
     if data is None or data.action is None:
         return
@@ -184,9 +189,11 @@ def _set_influence(
 def _action_of(
     scene: bpy.types.Scene, rig: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer
 ) -> tuple[bpy.types.Action, bool]:
-    """An action with the curves that a layer's mask allows; whether the action is a constant pose.
+    """The action that a strip plays for a layer: only the curves that the layer's mask allows.
 
-    The layer's action itself is returned if the mask allows all its curves.
+    Returns:
+        The action, and whether it is a constant pose. For a layer of kind ACTION whose mask allows
+        all curves, the action is the layer's own action; otherwise it is a new action.
     """
     controls = parts.controls_there(rig)
     if layer.kind == "ACTION":

@@ -22,7 +22,8 @@ SWITCH = "risorius_use_range"
 SOURCE = "risorius_range_source"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 _LEAST, _MOST = 0.1, 1.9  # limits of extreme minus neutral, equal to the limits in risorius.ranges
-# Number of changes of the capture ranges of all faces, which caches compare.
+# Number of changes of the capture ranges of all faces since the add-on was enabled. A cache
+# compares this number with its stored number to notice changes.
 _changes = session.value("range_properties.changes", 0, ("unregister",))
 
 
@@ -83,7 +84,11 @@ def changes() -> int:
 
 
 def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
-    """The ranges of a face, one for each control. Args: controls  its control armature."""
+    """The ranges of a face, one for each control.
+
+    Args:
+        controls: the character's control armature.
+    """
     return list(getattr(controls, ROWS))
 
 
@@ -142,7 +147,11 @@ def keep(controls: ArmatureObject, ranges: "native.Ranges") -> None:
 
 
 def forget(controls: ArmatureObject) -> None:
-    """Remove the ranges of a face. Args: controls  its control armature."""
+    """Remove the ranges of a face.
+
+    Args:
+        controls: the character's control armature.
+    """
     rows: Any = getattr(controls, ROWS)
     rows.clear()
     setattr(controls, SOURCE, "")

@@ -88,7 +88,8 @@ _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load
 def trouble(controls: ArmatureObject) -> str:
     """The reason why the tweak could not store the last key or moved control; "" if it could.
 
-    Args: controls  a control armature.
+    Args:
+        controls: a control armature.
     """
     return _troubles.get(controls.session_uid, "")
 
@@ -330,7 +331,11 @@ def _take_all(
     Then reset controls that were keyed at other frames: they get the values that they have at the
     current frame without the tweak.
 
-    hands: the moved controls, one _Hand for each frame, from `_hands_of`.
+    Args:
+        controls: the control armature.
+        tweak: the active tweak.
+        hands: the moved controls, one _Hand for each frame, from `_hands_of`.
+        frame: current frame of the scene.
     """
     with tweaks.curves_so_far(controls) as old:
         for hand in hands:

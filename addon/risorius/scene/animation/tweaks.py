@@ -355,7 +355,11 @@ def is_mixed(controls: ArmatureObject) -> bool:
 
 
 def now(controls: ArmatureObject) -> Stand:
-    """The current pose of the controls. Args: controls  the original or evaluated armature."""
+    """The current pose of the controls.
+
+    Args:
+        controls: the original or evaluated armature.
+    """
     face, rig = controls.pose.bones[parts.FACE], parts.rig_of(controls.original)
     found = Stand({n: float(v) for n, v in face.items() if isinstance(v, float)})
     if rig is not None:
@@ -461,9 +465,11 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
 
 
 def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
-    """Slider -> change of its value by moved handles; empty unless the face board leads.
+    """Reset the handles of a leading face board to the pose without the tweak.
 
-    The handles return to the pose without the tweak.
+    Returns:
+        Slider -> its value before the reset minus its value after the reset. Empty if no face board
+        leads.
 
     Args:
         controls: the control armature.
@@ -493,7 +499,7 @@ def _layer(controls: ArmatureObject, tweak: Tweak) -> layer_properties.RISORIUS_
 
 
 def _hold_ends(curve: bpy.types.FCurve, tweak: Tweak) -> None:
-    """Add keys at both ends of the tweak with the values of the first and last inner key."""
+    """Add a key at each end of the tweak, with the value of the nearest key between the ends."""
     inner = [k for k in curve.keyframe_points if tweak.first + 1e-3 < k.co.x < tweak.last - 1e-3]
     for frame, value in ((tweak.first, inner[0].co.y), (tweak.last, inner[-1].co.y)):
         curve.keyframe_points.insert(frame, value)

@@ -125,7 +125,11 @@ def surface_of(part: native.HeadPart) -> native.HeadSurface:
 
 
 def find_task(head: Head) -> Task[Finding]:
-    """A background task that finds the landmarks of a head. Args: head  from `read`."""
+    """A background task that finds the landmarks of a head.
+
+    Args:
+        head: the result of `read`.
+    """
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Finding:
         return on_object(head, _search(head, telling(progress, cancelled)))

@@ -22,19 +22,24 @@ _CARRIED = 0.9  # progress of stage FIT when the transfer of expressions ends
 
 
 class HeadTask(Task[Result], Generic[Result]):
-    """A task that first fits a template face to the head, then makes the joints.
+    """A task on a head, in one or two stages. The attribute `stage` names the current stage.
 
-    The attribute `stage` is FIT or JOINTS.
+    FIT: a template face is fitted to the head. JOINTS: the joints of the new face are made; a task
+    that conforms a face to the head lacks this stage.
     """
 
     stage = FIT
 
     def part(self, stage: str, begin: float, end: float) -> Progress:
-        """Begin a stage of the task. Returns: a function that takes the stage's progress, 0 to 1.
+        """Begin a stage of the task.
 
         Args:
             stage: FIT or JOINTS.
-            begin, end: progress of the task, 0 to 1, when the stage begins and ends.
+            begin, end: progress of the whole task, 0 to 1, when the stage begins and ends.
+
+        Returns:
+            A function to call with the progress of the stage, 0 to 1; it sets the progress of the
+            task.
         """
         self.stage = stage
 
@@ -200,7 +205,7 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
 
 
 def _textures(dna: native.Dna, source: str, path: str) -> dict[Path, bytes]:
-    """The texture files of a face as bytes, by the paths that belong to the new DNA file.
+    """The texture files of a face: path in the texture folder of the new DNA file -> bytes.
 
     Args:
         dna: the face.

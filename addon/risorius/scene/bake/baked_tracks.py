@@ -89,7 +89,11 @@ def _is_array(path: str) -> bool:
 
 
 def _others(values: Mapping[str, list[list[float]]], owner: bpy.types.ID) -> Iterator[Track]:
-    """A track for each sampled property. Args: values  data path -> components at each frame."""
+    """A track for each sampled property.
+
+    Args:
+        values: data path -> components at each frame.
+    """
     for path, rows in values.items():
         group = path.split('"')[1] if '"' in path else "Object Transforms"
         indexed = len(rows[0]) > 1

@@ -42,7 +42,8 @@ class Samples:
             scene uses Time Stretching.
         raw: float32[N, R], the raw controls for the rig, with layers.
         sliders: float32[N, R], like raw, but before the eye bones add to the look controls.
-        turns: for each frame, "neck" and "head" -> Quaternion, see inputs.read_inputs.
+        turns: for each frame, "neck" and "head" -> Quaternion in the axes of the control armature,
+            including the rotation of a body; unrotated bones are left out.
         basis: control bone -> float64[N, 4, 4], matrices relative to its rest pose, after
             constraints and layers.
         places: float64[N, 4, 4], world matrices of the control armature.
@@ -255,7 +256,8 @@ class _Reader:
 
         Args:
             depsgraph: dependency graph at this frame; it is evaluated again with the posed rig.
-            raw, own: results of inputs.read_mixed.
+            raw: float32[R], the raw controls with layers, before the eye bones add to them.
+            own: rotations and gaze target of the control bones, with layers.
         """
         if not joint_readings.of(self.rig, self.live).places:
             yield

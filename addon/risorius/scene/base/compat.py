@@ -155,7 +155,7 @@ def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChanne
 def curves_for(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
     """The F-curves of an action that move a datablock.
 
-    If the action has slots, these are the curves of one slot, see `slot_for`.
+    If the action has slots, these are the curves of the slot that fits the datablock.
 
     Args:
         action: any action.

@@ -39,7 +39,9 @@ def quiet() -> Iterator[None]:
 def _turn_away() -> int | None:
     """Redirect standard output to the null device.
 
-    Returns: a copy of the earlier file descriptor; None if standard output is closed.
+    Returns:
+        A copy of the file descriptor that standard output had before; None if standard output is
+        closed.
     """
     with suppress(OSError):  # standard output may be closed, for example in a service
         kept = os.dup(1)

@@ -28,7 +28,8 @@ _WITH_NODES = (
 def owners() -> Iterator[bpy.types.ID]:
     """Every datablock of this .blend, and the node trees inside datablocks.
 
-    Every driver belongs to one of them; not all of them can have drivers.
+    Each driver of the .blend belongs to one of the results. Some of the results cannot have
+    drivers.
     """
     for kind in bpy.data.bl_rna.properties:
         if kind.type != "COLLECTION":

@@ -14,7 +14,11 @@ WORDS = (
 
 
 def be_born(controls: ArmatureObject) -> None:
-    """Store the version number and the text NEEDS on a character. Args: controls  new armature."""
+    """Store the version number, and a text for users who lack the add-on, on a new character.
+
+    Args:
+        controls: the control armature of the character.
+    """
     controls[VERSION] = PRESENT
     controls[NEEDS] = WORDS
 

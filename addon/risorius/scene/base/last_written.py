@@ -10,28 +10,31 @@ import bpy
 
 from . import session
 
-# Deforming armature -> inputs of the last evaluation of its face.
+# Session uid of a deforming armature -> inputs of the last evaluation of its face.
 inputs: dict[int, object] = session.table("last_written.inputs", ("rewrite", "undo", "load"))
-# Deforming armature -> bytes of the object matrix that was last written to it.
+# Session uid of a deforming armature -> bytes of the object matrix that was last written to it.
 places: dict[int, object] = session.table("last_written.places", ("rewrite", "undo", "load"))
-# Shape keys -> bytes of the channel weights from which the live shape key (the sum of all channels)
-# was last computed.
+# Session uid of a Key datablock -> bytes of the channel weights from which its live shape key (the
+# sum of all channels) was last computed.
 weights: dict[int, object] = session.table("last_written.weights", ("rewrite", "undo", "load"))
-# Deforming armature -> the Writer of skinning/bone_writer.py.
+# Session uid of a deforming armature -> the object of class Writer (skinning/bone_writer.py) that
+# writes the armature's bones.
 bone_writers: dict[int, object] = session.table(
     "last_written.bone_writers", ("rewrite", "undo", "load")
 )
-# Deforming armature -> the Reading of frame/joint_readings.py. Undo keeps the table, because a
-# Reading stores which messages were printed.
+# Session uid of a deforming armature -> the armature's object of class Reading, see
+# frame/joint_readings.py. Undo keeps the table, because a Reading stores which messages were
+# printed.
 readings: dict[int, object] = session.table("last_written.readings", ("load",))
-# Shape keys whose points were last written without notifying Blender.
+# Session uids of Key datablocks whose points were last written without notifying Blender.
 unheard: set[int] = session.keep("last_written.unheard", set, ("rewrite", "undo", "load"))
-# Objects on which Blender ignored the last write, such as linked objects without an override.
+# Session uids of objects on which Blender ignored the last write, such as linked objects without an
+# override.
 _refused: set[int] = session.keep("last_written.refused", set, ("rewrite", "undo", "load"))
 
 
 def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
-    """Store the state of a datablock. Returns: whether it differs from the stored state.
+    """Store the state of a datablock, and return whether it differs from the state stored before.
 
     Args:
         kept: table of states: `inputs`, `places` or `weights`.

@@ -18,7 +18,8 @@ LOD_RENDER = "risorius_lod_render"  # on the deforming armature: level in render
 LOD_BY_DISTANCE = (
     "risorius_lod_by_distance"  # on the rig: whether camera distance chooses the level
 )
-# On the rig: entry n is the camera distance in Blender units at which level n + 1 begins.
+# Array property of the deforming armature: entry n is the distance from the camera, in Blender
+# units, at which level of detail n + 1 begins.
 LOD_DISTANCES = "risorius_lod_distances"
 FOLLOW = "risorius_follow"  # on the rig: whether it copies the transform of the control armature
 UNIT = "risorius_unit"  # on the deforming armature: metres per Blender unit at import
@@ -34,12 +35,12 @@ MESH = "dna_mesh"  # on a mesh object: index of its mesh in the DNA file
 RESIDUAL = "risorius_residual"  # colour attribute: distance of the solved face from the source mesh
 LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: index of its joint in the DNA file
-# On a mesh object, before the name of a flag such as hide_render: the last written value of the
-# flag.
+# Prefix of custom properties of a mesh object. The rest of a property's name is the name of a flag
+# such as hide_render; the property stores the value of this flag that the add-on wrote last.
 HIDDEN_PREFIX = "risorius_"
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
-# On a mesh object in Direct mode (see direct.py): persistent uid of its Armature modifier, which
-# is switched off.
+# Custom property of a mesh object in Direct mode (see skinning/direct.py): persistent uid of the
+# object's Armature modifier, which is switched off in this mode.
 FINISHED = "risorius_finished"
 SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" forbids Direct mode
 JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: saved with shown joints by an old add-on
@@ -57,11 +58,12 @@ TEST = (
     "risorius_test"  # on the deforming armature: a channel's test override, see channel_preview.py
 )
 LOOK = "risorius_look"  # on the deforming armature: solo and mute settings, see look_masks.py
-# On the rig: kind, largest motion and contents of its heat map. A colour attribute of the coloured
-# meshes has this name too.
+# Custom property of the deforming armature: kind, largest motion and contents of its heat map. The
+# colour attribute of the coloured meshes has this name too.
 HEAT = "risorius_heat"
 HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with a heat map: colour attributes active before
-# On rig or controls: settings of a bake. The evaluator skips a rig that has this property.
+# Custom property of a baked deforming armature or control armature: settings of the bake. The
+# evaluator skips a deforming armature that has this property.
 BAKED = "risorius_baked"
 MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
@@ -165,7 +167,11 @@ def title_of(rig: ArmatureObject) -> str:
 
 
 def maximum_of(controls: ArmatureObject) -> float:
-    """The hard maximum of a character's sliders. Args: controls  its control armature."""
+    """The hard maximum of a character's sliders.
+
+    Args:
+        controls: the character's control armature.
+    """
     return 1.5 if controls.get(OVERDRIVE) else 1.0
 
 

@@ -19,6 +19,7 @@ from collections.abc import (
 from functools import lru_cache
 from typing import Generic, Literal, Protocol, TypeVar, cast, get_args
 
+# The events at which registered tables and values are reset.
 # free: before undo, redo and load, which invalidate pointers to Blender's data. undo: after undo
 # and redo. load: after a file was loaded. frame: before a frame is evaluated. rewrite: all values
 # must be written again. unregister: empties all tables except those with quit. Tables with quit
@@ -166,7 +167,11 @@ def at(*ends: End) -> Callable[[Function], Function]:
 
 
 def end(word: End) -> None:
-    """Reset all values that are registered for an event. Args: word  the event."""
+    """Reset all values that are registered for an event.
+
+    Args:
+        word: the event.
+    """
     for entry in _by_end.get(word, ()):
         entry.clear()
 
@@ -177,7 +182,11 @@ def held() -> list[str]:
 
 
 def ends_of(name: str) -> tuple[str, ...]:
-    """The events that reset a value. Args: name  of the value."""
+    """The events that reset a value.
+
+    Args:
+        name: name of the value.
+    """
     return tuple(_entries[name].ends)
 
 
@@ -201,7 +210,7 @@ def _name(function: object) -> str:
 
 
 def _refill(kept: object, fresh: object) -> None:
-    """Replace the content of an object by the content of a new object."""
+    """Replace the content of the object `kept` by the content of the object `fresh`."""
     if isinstance(kept, MutableMapping):
         kept.clear()
         kept.update(cast("MutableMapping[object, object]", fresh))
@@ -218,7 +227,10 @@ def _refill(kept: object, fresh: object) -> None:
 
 
 def _is_like(kept: object, fresh: object) -> bool:
-    """Whether an object equals a new object; of lists only the length is compared."""
+    """Whether the object `kept` equals `fresh`, a new object in its initial state.
+
+    Only the lengths of lists are compared, not their contents.
+    """
     if isinstance(kept, Sized) and isinstance(fresh, Sized) and len(kept) != len(fresh):
         return False
     if isinstance(kept, (MutableMapping, MutableSet)):

@@ -146,7 +146,7 @@ def _merge(equal: Sequence[bpy.types.Image], rigs: Sequence[ArmatureObject]) -> 
 def _show_instead(
     rigs: Iterable[ArmatureObject], image: bpy.types.Image, other: bpy.types.Image
 ) -> None:
-    """Replace an image by another image in the materials of characters."""
+    """Replace `image` by the image `other` in the materials of characters."""
     for rig in rigs:
         for node in nodes_of(rig):
             if node.image == image and node.id_data.library is None:
@@ -171,9 +171,13 @@ def _separate(image: bpy.types.Image, owners: Sequence[ArmatureObject]) -> list[
 
 
 def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.Image:
-    """A new image from packed bytes, with colour space and alpha mode from the text `state`.
+    """Make a new image from packed bytes.
 
-    If the text is invalid, the current settings of `image` are used.
+    Args:
+        content: bytes of an image file.
+        image: the edited image; the new image gets its name and path.
+        state: colour space and alpha mode of the new image, in two lines. If they are invalid, the
+            settings of `image` are used.
     """
     space, alpha = (*state.split("\n"), "")[:2]
     fresh = bpy.data.images.new(image.name, 1, 1)
@@ -191,7 +195,7 @@ def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.I
 
 
 def _takes(owner: bpy.types.bpy_struct, name: str, choice: str) -> bool:
-    """Set an enum property. Returns: whether the property accepts this choice."""
+    """Set an enum property, and return whether the property accepts the given choice."""
     try:
         setattr(owner, name, choice)
     except TypeError:

@@ -66,7 +66,12 @@ class Stage:
         return self.evaluate_frame(user.frame_current, user.frame_subframe)
 
     def evaluate_frame(self, frame: int, part: float = 0.0) -> Depsgraph:
-        """The dependency graph at a frame. Args: frame  whole frame; part  subframe, 0 to 1."""
+        """The dependency graph at a frame.
+
+        Args:
+            frame: the whole part of the frame number.
+            part: the fraction of the frame number, 0 to 1.
+        """
         own, layer = self._scene, self._scene.view_layers[0]
         own.frame_current = frame
         if own.frame_subframe != part:

@@ -62,7 +62,12 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
 
 
 def _holding(wanted: bytes, digest: str) -> bpy.types.Text | None:
-    """A Text of this .blend whose DNA file has these bytes, or None."""
+    """A Text of this .blend that stores a DNA file with the given bytes, or None.
+
+    Args:
+        wanted: bytes of the DNA file.
+        digest: SHA-256 hash of these bytes.
+    """
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
             return text
@@ -111,7 +116,11 @@ def content_hash(text: object) -> str:
 
 
 def text_of(rig: ArmatureObject) -> bpy.types.Text | None:
-    """The Text with the DNA file of a character, or None. Args: rig  its deforming armature."""
+    """The Text with the DNA file of a character, or None.
+
+    Args:
+        rig: the character's deforming armature.
+    """
     text = rig.get(parts.DNA)
     return text if isinstance(text, bpy.types.Text) else None
 
@@ -132,9 +141,17 @@ def content(text: object) -> bytes:
 
 
 def _limit(text: bpy.types.Text, packed: bytes) -> int:
-    """The largest number of bytes to unpack: the stored length, or the limit if none is stored.
+    """The largest number of bytes to unpack: the length of the DNA file that the Text stores.
 
-    Raises ContentError if the stored length is invalid or exceeds the limit.
+    If the Text stores no length, the result is the largest allowed length: _MOST_TIMES times the
+    packed size plus 64 KB.
+
+    Args:
+        text: a Text with a DNA file.
+        packed: the packed bytes of the file.
+
+    Raises:
+        ContentError: the stored length is invalid, or larger than the largest allowed length.
     """
     said = text.get(_LENGTH)
     if said is None:
@@ -155,7 +172,16 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
 
 
 def _unpack(packed: bytes, limit: int) -> bytes:
-    """Unpack in pieces up to a limit, because a malicious file may unpack to any size."""
+    """Unpack the bytes of a DNA file in pieces, because a malicious file may unpack to any size.
+
+    Args:
+        packed: the packed bytes.
+        limit: largest number of unpacked bytes.
+
+    Raises:
+        ContentError: the bytes are damaged, do not begin like a DNA file, or unpack to more bytes
+            than `limit`.
+    """
     unpacking = zlib.decompressobj()
     pieces, count, rest = [], 0, packed
     while not unpacking.eof:

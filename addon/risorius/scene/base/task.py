@@ -43,8 +43,10 @@ class Task(Generic[Result]):
     def __init__(self, work: Work[Result]) -> None:
         """Prepare the thread without starting it.
 
-        Args: work  function with two arguments: `progress`, which it calls with its progress (0 to
-        1), and `cancelled`, which returns True if the work must end early.
+        Args:
+            work: function with two arguments: `progress`, a function that it calls with its
+                progress (0 to 1), and `cancelled`, a function that returns True if the work must
+                end early.
         """
         self.share = 0.0
         self.result: Result | None = None

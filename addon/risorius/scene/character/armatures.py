@@ -317,7 +317,11 @@ def build_controls(
 
 
 def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
-    """Control bone -> (position, direction, length in Blender units, name of the parent bone)."""
+    """Control bone -> (position of its head, direction, length, name of the parent bone).
+
+    Positions and lengths are in Blender units, directions are unit vectors. A bone without a parent
+    has "" as the parent's name.
+    """
     rest, anchors, size = plan.armature.rest, plan.anchors, plan.size
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -348,7 +352,11 @@ def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
 
 
 def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
-    """The extent of a face, to place outlines of bones. Args: plan  its meshes and joints."""
+    """The extent of a face, to place outlines of bones.
+
+    Args:
+        plan: the plan of the face, for its meshes and joints.
+    """
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     between = control_places(plan)["eyes"][0]
     middle, wide = _sides(points, between[2], plan.size)

@@ -106,7 +106,8 @@ def leads(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
 def leads_face(rig: ArmatureObject) -> bool:
     """Whether the face board leads a face; False while its controls are baked.
 
-    Args: rig  the deforming armature of the face.
+    Args:
+        rig: the deforming armature of the face.
     """
     controls = parts.controls_of(rig)
     return controls is not None and leads(controls, runtime.of(rig))
@@ -431,7 +432,11 @@ def pasted_flipped(rig: ArmatureObject, sign: float) -> dict[str, float]:
 
 
 def is_same(one: runtime.Runtime, other: runtime.Runtime) -> bool:
-    """Whether two faces have equal handles. Args: one, other  Runtimes of the faces."""
+    """Whether two faces have equal handles.
+
+    Args:
+        one, other: Runtimes of the faces.
+    """
     return one.handles == other.handles
 
 
@@ -460,5 +465,9 @@ def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None
 
 
 def path_of(bone: str) -> str:
-    """The data path of a handle's location, from the armature. Args: bone  name of its bone."""
+    """The data path of a handle's location, from the armature.
+
+    Args:
+        bone: name of the handle's bone.
+    """
     return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].location'

@@ -151,12 +151,12 @@ def show(controls: ArmatureObject, visible: bool) -> None:
 
 
 def _sideways(live: runtime.Runtime) -> dict[int, float]:
-    """GUI control -> joint motion along +x, divided by the length of the motion; -1 to 1.
+    """Index of a GUI control -> joint motion along +x, divided by the motion's length; -1 to 1.
 
     The motion from rest to the control's highest value is summed over all joints; +x is the left
-    side of the face. Only controls that move
-    the middle of the face sideways are included. Their names do not define the direction, because
-    "left" in jawLeft may mean the viewer's left.
+    side of the face. Only controls that move the middle of the face sideways are included. The
+    names of these controls do not define the direction, because "left" in jawLeft may mean the
+    viewer's left.
     """
     table = live.table
     chosen = [
@@ -183,7 +183,11 @@ def _sideways(live: runtime.Runtime) -> dict[int, float]:
 
 
 def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.float64]:
-    """float64[J, 3]: joint positions in Blender units. Args: deltas  float32[J, 9] of a Pose."""
+    """float64[J, 3]: joint positions in Blender units.
+
+    Args:
+        deltas: float32[J, 9] of a Pose.
+    """
     dna, space = live.dna, live.space
     angles = np.asarray(dna.neutral_joint_rotations, np.float64)
     if live.rig.rotation == "euler":
@@ -324,7 +328,7 @@ def _disc(controls: ArmatureObject, layout: Board, name: str) -> bpy.types.Objec
 
 
 def _limit(bone: bpy.types.PoseBone, handle: Handle) -> None:
-    """Set size, colour, locks and range of a handle."""
+    """Set the size, the colour, the locks and the range of the bone of a handle."""
     wide = 0.3 if handle.x is not None and handle.y is not None else 0.2
     bone.custom_shape_scale_xyz = (wide, wide, wide)
     bone_shapes.colour(bone, _SIDE_COLOURS[handle.side])

@@ -135,7 +135,11 @@ def drawn(name: str, lines: Sequence[Line]) -> bpy.types.Object:
 
 
 def disc(name: str) -> bpy.types.Object:
-    """Make a filled disc of radius 1, which is easy to click. Args: name  of the datablocks."""
+    """Make a filled disc of radius 1, which is easy to click.
+
+    Args:
+        name: name of the datablocks.
+    """
     mesh = bpy.data.meshes.new(name)
     ring = [(x, y, 0.0) for x, y in _ring()]
     # The disc has a second face for its back, because Blender draws only the front of a face and

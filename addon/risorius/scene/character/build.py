@@ -26,7 +26,9 @@ class BuildOptions:
 
     Attributes:
         lods: levels of detail whose meshes are built; 0 is the finest.
-        mode: LIVE, KEYS or AUTO, see change_mode.
+        mode: shape keys of the meshes. LIVE: one shape key with the sum of all blend shape
+            channels; AUTO: the same, in Direct mode if possible; KEYS: one shape key for each
+            channel.
         normals: whether the file's normals are kept as custom normals.
         materials: whether materials are built.
         textures: whether to load textures from the folders near the file and from texture_folder.

@@ -47,7 +47,11 @@ def fresh_weights(item: MeshObject) -> bool:
 
 
 def note_edit(uid: int) -> None:
-    """Record that a mesh was edited. Args: uid  session uid of the mesh object."""
+    """Record that a mesh was edited.
+
+    Args:
+        uid: session uid of the mesh object.
+    """
     _fresh.discard(uid)
 
 
@@ -373,7 +377,11 @@ def _to_live(
 
 
 def add_live_key(item: MeshObject) -> None:
-    """Add a live key to a mesh. Args: item  the mesh object."""
+    """Add a live key to a mesh.
+
+    Args:
+        item: the mesh object.
+    """
     if item.data.shape_keys is None:
         item.shape_key_add(name="Basis", from_mix=False)
     block = item.shape_key_add(name=LIVE_KEY, from_mix=False)

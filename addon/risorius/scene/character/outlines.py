@@ -37,7 +37,11 @@ def hide(controls: ArmatureObject) -> None:
 
 
 def show(controls: ArmatureObject) -> None:
-    """Show hidden outlines in their earlier sizes. Args: controls  control armature of the face."""
+    """Show hidden outlines in their earlier sizes.
+
+    Args:
+        controls: control armature of the face.
+    """
     held: Any = controls.get(parts.OUTLINES)
     sizes = held.to_dict() if hasattr(held, "to_dict") else {}
     for part, bone in _bones(controls):

@@ -53,7 +53,11 @@ def _follows(rig: ArmatureObject) -> bool:
 
 
 def _is_at(rig: ArmatureObject, wanted: NDArray[np.float64]) -> bool:
-    """Whether a rig's object matrix equals a matrix up to rounding. Args: wanted  the matrix."""
+    """Whether a rig's object matrix equals a matrix up to rounding.
+
+    Args:
+        wanted: the matrix.
+    """
     there = np.array(rig.matrix_basis).ravel()
     return bool(np.abs(there - wanted.ravel()).max() <= _NEAR * np.abs(wanted).max())
 
@@ -169,7 +173,8 @@ def attach(
     hold = cast("bpy.types.ChildOfConstraint", controls.constraints.new("CHILD_OF"))
     hold.name = CONSTRAINT
     hold.target, hold.subtarget = body, base
-    # The face is attached relative to the body's rest pose, so that the current pose moves it.
+    # The face is attached relative to the body's rest pose, so that it follows the body's current
+    # pose at once.
     rest = body.matrix_world @ body.data.bones[base].matrix_local
     hold.inverse_matrix = rest.inverted_safe()
     hold.set_inverse_pending = False
@@ -253,8 +258,13 @@ def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
 def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, scale: bool) -> None:
     """Move the face so that its head bone at rest meets the body's head bone at rest.
 
-    Without head bones, the neck bones are used. `scale`: also scale the face, so that its neck is
-    as long as the neck of the body.
+    If a head bone is missing, the neck bones are used instead.
+
+    Args:
+        controls: the control armature of the face.
+        body: the armature object of the body.
+        neck, head: names of the body's bones; "": none.
+        scale: True: also scale the face, so that its neck is as long as the neck of the body.
     """
     own = controls.data.bones
     pairs = [

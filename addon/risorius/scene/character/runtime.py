@@ -105,7 +105,11 @@ class Runtime:
         return replace(self, board=PRIMARY)
 
     def with_board(self, kind: str) -> Runtime:
-        """This Runtime, or its copy for the primary board. Args: kind  PRIMARY or COMPLETE."""
+        """This Runtime, or its copy for the primary board.
+
+        Args:
+            kind: PRIMARY or COMPLETE.
+        """
         assert self.board == COMPLETE or kind == PRIMARY
         return self._with_primary if kind != self.board else self
 
@@ -290,7 +294,8 @@ def unit_of(rig: ArmatureObject) -> float:
 def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
     """Drop compiled data of deleted characters, and forget the last written values of all.
 
-    Args: rigs  deforming armatures that exist.
+    Args:
+        rigs: deforming armatures that exist.
     """
     used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
     for key in [k for k in _cache if k[0] not in used]:

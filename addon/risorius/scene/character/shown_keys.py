@@ -13,8 +13,8 @@ from ..base import compat, parts, session
 from ..base.blender_types import ArmatureObject, Context, current_context
 from . import armatures
 
-# Session uid of a control armature -> session uid of its action and number of slider keys at
-# the last call of `note_edit`.
+# Session uid of a control armature -> (session uid of its active action, number of slider keys in
+# this action) at the last call of `note_edit`.
 _counts: dict[int, tuple[int, int]] = session.table("shown_keys.counts", ("undo", "load"))
 
 

@@ -84,7 +84,11 @@ class Held:
 
 
 def hold(rig: ArmatureObject) -> Held:
-    """Store the current values of sliders and handles. Args: rig  the character."""
+    """Store the current values of sliders and handles.
+
+    Args:
+        rig: the character.
+    """
     face, live, controls = parts.face_bone(rig), runtime.there(rig), parts.controls_there(rig)
     assert face is not None
     sliders = {label: face[label] for label in live.labels if label in face}

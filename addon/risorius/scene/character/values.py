@@ -81,7 +81,11 @@ def carry(rig: ArmatureObject, item: MeshObject) -> None:
 
 
 def carry_on_largest(rig: ArmatureObject) -> None:
-    """Make the mesh with most vertices the carrier of the maps. Args: rig  deforming armature."""
+    """Make the mesh with most vertices the carrier of the maps.
+
+    Args:
+        rig: deforming armature.
+    """
     items = [item for item in parts.meshes_of(rig) if item.library is None]
     if items and saved.length(rig, parts.MAPS):
         carry(rig, max(items, key=lambda item: len(item.data.vertices)))

@@ -42,7 +42,8 @@ class HeadTurns:
         Args:
             rig: the original (not evaluated) deforming armature.
             live: Runtime of the character.
-            turns: "neck" and "head" -> Quaternion in the armature's axes, from read_inputs.
+            turns: rotations by the neck and head bones and the body: "neck" and "head" ->
+                Quaternion in the armature's axes.
             depsgraph: graph in which the rig was evaluated.
         """
         seen = rig.evaluated_get(depsgraph)

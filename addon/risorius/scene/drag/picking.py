@@ -81,8 +81,10 @@ def _first(
 ) -> tuple[bpy.types.Object, Vector, int, Matrix] | None:
     """The first object that a ray meets, except objects drawn as wire or bounds.
 
-    Returns: (original object, location in world space, index of the polygon, world matrix); None if
-    the ray meets nothing else or more than _THROUGH such objects.
+    Returns:
+        (Original object, location of the hit in world space, index of the hit polygon, world matrix
+        of the object). None if the ray meets no other object, or if it meets _THROUGH objects that
+        are drawn as wire or bounds first.
     """
     depsgraph = context.evaluated_depsgraph_get()
     for _ in range(_THROUGH):

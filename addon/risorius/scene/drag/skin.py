@@ -68,7 +68,11 @@ class Skin:
         return cls(surface, items, size or 1.0, context.evaluated_depsgraph_get(), live)
 
     def show(self, context: Context) -> None:
-        """Evaluate the face with changed sliders. Args: context  its view layer is evaluated."""
+        """Evaluate the face with changed sliders.
+
+        Args:
+            context: its view layer is evaluated.
+        """
         context.view_layer.update()  # its handler writes the bones, which need a second update
         context.view_layer.update()
         self.depsgraph = context.evaluated_depsgraph_get()

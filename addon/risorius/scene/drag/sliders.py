@@ -37,9 +37,10 @@ class Sliders:
         seen: float32[R], the raw controls of the face, with layers and eye bones.
         gain: float64[R], change of a raw control divided by the change of its slider; 1 if this
             is too small for a drag.
-        free: bool[R], sliders that can move.
+        free: bool[R], sliders that the drag may move.
         low, high: float64[R], the limits of `seen`.
-        linked: (index of a slider, index of the slider on the other side that follows it).
+        linked: for each slider that a driver links to the other side: (index of the slider that
+            leads, index of the slider that follows).
         places: bone -> location of each handle of a leading face board; empty if sliders lead.
     """
 
@@ -54,7 +55,11 @@ class Sliders:
     places: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     def values(self, raw: NDArray[np.float32]) -> Float:
-        """float64[R]: slider values that give wanted raw controls. Args: raw  float32[R]."""
+        """float64[R]: the slider values that give wanted raw controls.
+
+        Args:
+            raw: float32[R], the wanted raw controls.
+        """
         change = raw.astype(np.float64) - self.seen
         moved = self.free & (np.abs(change) > 1e-7)
         values = np.where(moved, self.start + change / self.gain, self.start)

@@ -107,30 +107,34 @@ class Stroke:
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)
     _was: NDArray[np.float32] | None = None  # [V, 3], dragged mesh at press, file space
     _eases: dict[tuple[Point, ...], Float] = field(default_factory=dict)
-    # float64[3]: seen minus predicted position of the point, in world space.
+    # float64[3]: evaluated position of the dragged point minus the position that the solver
+    # predicts, in world space.
     _apart: Float = field(default_factory=lambda: np.zeros(3))
 
     @property
     def start(self) -> Float:
-        """float64[3]: position of the point at the press, in world space."""
+        """float64[3]: position of the dragged point at the mouse press, in world space."""
         return self._of().world[0]
 
     @property
     def dragged_region(self) -> str:
-        """The region of the control that moves the point most, of those that the drag may move."""
+        """The region of the control that moves the dragged point most.
+
+        Only controls that the drag may move are compared.
+        """
         strongest = int(np.argmax(np.linalg.norm(self.reach, axis=0) * self.state.free))
         return native.regions().of_slider(self.live.labels[strongest])
 
     def to(self, context: Context, target: Float, view: Float | None = None) -> Float:
-        """Drag the point to a target and show the face.
+        """Move the dragged point to a target as near as possible, and show the face.
 
         Args:
             context: its view layer is evaluated.
-            target: float64[3], wanted position in world space.
+            target: float64[3], wanted position of the point in world space.
             view: float64[3], a direction along which the position is free; None: no free direction.
 
         Returns:
-            float64[3]: the reached position in world space.
+            float64[3]: the reached position of the point in world space.
 
         Raises:
             FaceError: the face is a library override that Blender does not allow to change; the
@@ -202,8 +206,9 @@ class Stroke:
     def heat(self) -> tuple[Float, Float]:
         """Data for a heat map of the dragged mesh.
 
-        Returns: float64[V, 3] vertices in world space, float64[V] their motion since the press in
-        Blender units.
+        Returns:
+            float64[V, 3], the vertices in world space; float64[V], distance of each vertex from its
+            position at the mouse press, in Blender units.
         """
         mesh = self.point[0]
         if self._was is None:
@@ -244,7 +249,17 @@ class Stroke:
     def _solve(
         self, target: Float, view: Float | None, free: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float32], Float]:
-        """Returns: float32[R] solved raw controls, and the predicted world position float64[3]."""
+        """Solve the raw controls for a target of the dragged point.
+
+        Args:
+            target: float64[3], wanted position of the point in world space.
+            view: float64[3], a direction along which the position is free; None: no free direction.
+            free: bool[R], raw controls that may change.
+
+        Returns:
+            float32[R], the solved raw controls; float64[3], the position of the point that the
+            solver predicts, in world space.
+        """
         anchors = self._of()
         goal, axes = self._goal(anchors, target, view)
         near = self.options.method == "near"
@@ -346,9 +361,13 @@ class Stroke:
         return _Anchors(points, mirrored, rest.astype(np.float64), world, maps[:, :3, :3])
 
     def _seen(self, context: Context) -> Float:
-        """Evaluate the face. Returns: the world position of the point.
+        """Evaluate the face.
 
-        Raises FaceError if the face is a library override that Blender does not allow to change.
+        Returns:
+            float64[3], the position of the dragged point in world space.
+
+        Raises:
+            FaceError: the face is a library override that Blender does not allow to change.
         """
         self.skin.show(context)
         if last_written.is_refused(self.rig):

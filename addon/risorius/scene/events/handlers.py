@@ -45,8 +45,8 @@ class _Work:
 
 
 _work = session.keep("handlers.work", _Work, ("unregister",))
-# Session uids. _objects: known objects of the file; empty after load and undo. _faces: known
-# control armatures. _mended: deforming armatures that were repaired since the last update.
+# Three sets of session uids. _objects: known objects of the file; empty after load and undo.
+# _faces: known control armatures. _mended: deforming armatures repaired since the last update.
 _objects = session.value("handlers.objects", frozenset[int](), ("undo", "load"))
 _faces = session.value("handlers.faces", frozenset[int](), ("unregister",))
 _mended: set[int] = session.keep("handlers.mended", set, ("load",))
@@ -106,7 +106,11 @@ def _render_ended(*_arguments: object) -> None:
 
 @persistent
 def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
-    """React to edits. A control armature is tagged only after a repair: tags call this again."""
+    """React to edits: evaluate the faces that an edit changes, and repair damaged faces.
+
+    Only after a repair is the control armature tagged for an update, because a tag makes Blender
+    call this function again.
+    """
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     joint_readings.note_edit()
@@ -230,7 +234,10 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
 def _note_keys(
     frame: float, armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
 ) -> None:
-    """Show keys, and move keys into tweaks, that Blender's operators may have just set.
+    """Handle new keys that Blender's operators may have inserted into the actions of faces.
+
+    New slider keys are made visible in the animation editors. While a tweak is active, new keys are
+    moved into it.
 
     Args:
         frame: current frame of the scene.
@@ -362,7 +369,7 @@ def refresh(moment: evaluate.Moment = evaluate.Moment.UPDATE) -> None:
     """Evaluate all characters now, in every scene and view layer.
 
     Args:
-        moment: the moment of this update, see evaluate.Moment.
+        moment: the reason for this evaluation, such as an edit, a frame or a loaded file.
     """
     if native.problem() or not parts.rigs():
         return

@@ -19,8 +19,8 @@ from ..skinning import conditions
 _LOOK_AGAIN = 0.5  # seconds between two checks whether an export dialog is open
 
 DIALOG, GLTF = "dialog", "gltf"  # readers: an export dialog, the glTF exporter
-# Reader of the face (DIALOG or GLTF) -> names of the deforming armatures that may not use Direct
-# mode while this reader works.
+# DIALOG or GLTF -> names of the deforming armatures that may not use Direct mode while this reader
+# of the faces works.
 _held: dict[str, list[str]] = session.table("ordinary_form.held", ("load",))
 _drawing = session.value("ordinary_form.drawing", cast("object", None), ("quit",))
 
@@ -29,7 +29,8 @@ def begin(reader: str) -> None:
     """Keep all faces out of Direct mode until `end` is called; a timer calls `end` for GLTF.
 
     Args:
-        reader: DIALOG or GLTF; a second call for the same reader has no effect.
+        reader: DIALOG (an export dialog is open) or GLTF (the glTF exporter writes). A second call
+            for the same reader has no effect until `end` is called.
     """
     if reader in _held:
         return
@@ -44,7 +45,11 @@ def begin(reader: str) -> None:
 
 
 def end(reader: str) -> None:
-    """Let faces use Direct mode again. Args: reader  the DIALOG or GLTF of the call of `begin`."""
+    """Let faces use Direct mode again after a reader has finished.
+
+    Args:
+        reader: DIALOG or GLTF, as in the call of `begin`.
+    """
     names = _held.pop(reader, None)
     if names is None:
         return

@@ -158,7 +158,10 @@ def _read(flat: _Flat) -> None:
 
 
 def _lay_out(flat: _Flat) -> None:
-    """Choose the UV layer for baking a material; meshes get a new layer if needed."""
+    """Choose the UV coordinates for baking a material.
+
+    The meshes get a UV map for baking if their own UV map is missing or cannot be used.
+    """
     if not flat.baked:
         return
     users = [(item, *_corners(item, slot)) for item, slot in flat.users]
@@ -328,9 +331,13 @@ def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
 
 
 def _aim(flat: _Flat, wanted: Sequence[str], image: bpy.types.Image) -> None:
-    """Set up a copy of a material for a bake: it emits the inputs `wanted` as colour.
+    """Set up the copy of a material for a bake: the copy emits the values of inputs as colour.
 
-    The image is the target of the bake.
+    Args:
+        flat: the material.
+        wanted: names of the inputs: ["color"], or "alpha" and "roughness", which are emitted as red
+            and green; empty: only the image is set.
+        image: the image into which the bake writes.
     """
     if flat.work is None:
         flat.work = flat.material.copy()
@@ -401,7 +408,13 @@ def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Imag
 
 
 def _finish_color(image: bpy.types.Image, alpha: NDArray[np.float32] | None) -> None:
-    """Store the opacity in the alpha channel; without opacity the alpha is 1 and unused."""
+    """Store the opacity of a material in the alpha channel of its baked colour image.
+
+    Args:
+        image: the colour image.
+        alpha: float32[height, width], the opacity; None: the alpha channel is set to 1, and
+            Blender ignores it.
+    """
     values = _pixels(image)
     seen = values[..., 3] > 0
     if seen.any():  # mipmaps blend unused pixels into used ones, so fill them with the mean colour
@@ -429,8 +442,13 @@ def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
 
 
 def _build(flat: _Flat, loans: Loans, files: list[str]) -> bpy.types.Material:
-    """Make the plain material for a user's material, with the same name. The names of its image
-    files are appended to `files`."""
+    """Make the plain material that replaces a user's material in the exported file.
+
+    Args:
+        flat: the user's material, with the images of its inputs.
+        loans: gives the plain material the name of the user's material.
+        files: names of image files; the names of the material's image files are appended.
+    """
     user = flat.material
     material = bpy.data.materials.new(flat.name)
     loans.take("materials", material, flat.name)
@@ -527,7 +545,10 @@ def _pack(image: bpy.types.Image) -> None:
 def _packed(flat: _Flat, name: str, image: bpy.types.Image, files: list[str]) -> bpy.types.Image:
     """Pack a baked image, or a copy of a reused image, under a new file name.
 
-    The file name is appended to `files`. Returns: the packed image.
+    The file name is appended to `files`.
+
+    Returns:
+        The packed image.
     """
     taken = name not in flat.baked
     if taken:

@@ -119,7 +119,7 @@ def source(shader: Node, *names: str) -> Source:
         names: names of the input in different Blender versions; the first existing one is used.
 
     Returns:
-        The Source; it has no value, node and socket if the shader has none of these inputs.
+        The Source. If the shader has none of these inputs, its value, node and socket are None.
     """
     socket = next((shader.inputs[n] for n in names if n in shader.inputs), None)
     if socket is None:
@@ -149,7 +149,9 @@ def normal_image(shader: Node) -> Node | None:
 
 
 def by_place(socket: Socket) -> bool:
-    """Whether a value depends on more than the UV map, such as attributes or geometry."""
+    """Whether the value of an output depends on more than the UV map: on geometry, attributes,
+    vertex colours or other texture coordinates.
+    """
     for node in [socket.node, *(n for s in socket.node.inputs for n in _upstream(s))]:
         if node.type in ("ATTRIBUTE", "NEW_GEOMETRY", "VERTEX_COLOR"):
             return True
@@ -159,7 +161,7 @@ def by_place(socket: Socket) -> bool:
 
 
 def _plain(node: Node) -> bool:
-    """Whether an image texture maps a single (not tiled) image by the mesh's UV map."""
+    """Whether an image texture shows a single image, without UDIM tiles, by the mesh's UV map."""
     image = node.image
     whole = image is not None and image.size[0] > 0 and image.source != "TILED"
     return whole and not node.inputs["Vector"].is_linked and node.projection == "FLAT"

@@ -38,7 +38,12 @@ def is_cut(path: Path) -> bool:
 
 
 def _contents_cut(table: bytes, size: int) -> bool:
-    """Whether a section of a USD crate file, or its table of sections, ends beyond the file."""
+    """Whether a section of a USD crate file, or the table of its sections, is cut off.
+
+    Args:
+        table: the bytes of the file from the beginning of its table of sections.
+        size: size of the file in bytes.
+    """
     count = int.from_bytes(table[:8], "little")
     if not 0 < count <= (len(table) - 8) // _SECTION.size:
         return True

@@ -75,7 +75,8 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
     """
     pose = poses.pose_for(runtime.there(rig), expression)
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
-    # The action of a viseme gets the viseme's name, because its label is only meant for panels.
+    # The action of a viseme is named after the viseme's name. Other actions are named after the
+    # expression's label; the label of a viseme is only meant for panels.
     sound = expression.group == "viseme"
     name = f"Face {expression.name if sound else expression.label}"
     old = _named(name)

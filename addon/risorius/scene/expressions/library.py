@@ -232,14 +232,15 @@ def write(where: Path, entries: Sequence[Entry]) -> list[Path]:
 
 
 def in_the_way(where: Path, entries: Sequence[Entry]) -> list[Entry]:
-    """Find the files that new entries would replace.
-
-    Returns: the entries; the attribute `over` of each entry is the existing file with the entry's
-    file name, or None.
+    """Find the existing files that new entries would replace.
 
     Args:
         where: the folder.
-        entries: entries without a file to replace.
+        entries: entries whose attribute `over` is None.
+
+    Returns:
+        Copies of the entries. The attribute `over` of each copy is the existing file with the
+        entry's file name; None if there is no such file.
     """
     folded = native.part("files.names").folded
     there = {folded(name): name for name in reversed(_stems(where))}

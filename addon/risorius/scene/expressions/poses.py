@@ -144,13 +144,13 @@ def captured(
 
 
 def held_by(expression: native.Expression, weights: Iterable[str]) -> set[str]:
-    """The regions that an expression names; if it names none, the regions of its sliders.
+    """The regions that an expression names; if it names no regions, the regions of its sliders.
 
-    A viseme that names none also has mouth, jaw and tongue.
+    A viseme that names no regions also has the regions mouth, jaw and tongue.
 
     Args:
         expression: the expression.
-        weights: names of the expression's sliders on this face, from weights_for.
+        weights: names of the sliders of this face to which the expression gives a value.
     """
     if expression.regions:
         return set(expression.regions)

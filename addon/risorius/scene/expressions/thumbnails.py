@@ -152,9 +152,14 @@ def _piece(
 
 
 def _iris(live: runtime.Runtime, places: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """bool[n]: whether a point of the eyeballs is near the front axis of the nearest eye.
+    """bool[n]: whether a point of the eyeballs lies on the iris of the nearest eye.
 
-    places: float[n, 3], centres of triangles in file space.
+    A point counts if it is in front of the eye's centre and near the axis on which the eye looks
+    ahead.
+
+    Args:
+        live: Runtime of the character.
+        places: float[n, 3], centres of the eyeballs' triangles in file space.
     """
     points = live.space.points(places)
     eyes = [live.rest[joint][:3, 3] for joint in live.anchors.eyes.values()]
@@ -194,7 +199,11 @@ def _pixels(
     """float32[h, w, 4]: an image, scaled down to at most _TEXELS in width and height.
 
     If the image has no transparent pixels, its alpha becomes the mean of red, green and blue.
-    None if its file is missing.
+    None if the file of the image is missing.
+
+    Args:
+        image: the image.
+        known: cache, full name of an image -> its pixels; this image is added.
     """
     if image.name_full not in known:
         copy = image.copy()
@@ -246,7 +255,11 @@ def make(
 
 
 def tidy() -> int:
-    """Remove the oldest pictures beyond a limit. Returns: the number of removed pictures."""
+    """Remove the oldest pictures if the folder has more than _MOST_FILES pictures.
+
+    Returns:
+        The number of removed pictures.
+    """
     with os.scandir(library.own_folder("thumbnails")) as entries:
         files = [(e.stat().st_mtime, Path(e.path)) for e in entries if e.name.endswith(".png")]
     old = sorted(files)[: max(0, len(files) - _MOST_FILES)]

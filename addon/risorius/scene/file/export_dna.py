@@ -28,7 +28,14 @@ class ExportError(FaceError):
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """Kinds of edits to write: shape keys, neutral mesh, neutral joints, skin weights."""
+    """The kinds of the user's edits that an export writes into the DNA file.
+
+    Attributes:
+        shapes: edits of shape keys.
+        neutral: edits of the neutral mesh.
+        joints: edits of the neutral joints.
+        weights: edits of skin weights.
+    """
 
     shapes: bool = True
     neutral: bool = True

@@ -228,15 +228,19 @@ def _edit(
     rest: Mapping[int, NDArray[np.float64]],
     changed: Collection[int],
 ) -> list[str]:
-    """Remove, add and move bones in edit mode. Returns: the bone name of each new joint.
+    """Remove, add and move bones in edit mode.
 
     Args:
         edit_bones: edit bones of the deforming armature.
         change: the replacement.
-        kept: index of a new joint -> name of its existing bone.
+        kept: index of a joint of the new file -> name of its existing bone.
         gone: names of bones whose joints the new file lacks.
-        rest: index of a new joint -> float64[4, 4], rest matrix in the armature's space.
-        changed: indices of new joints whose bones must be changed.
+        rest: index of a joint of the new file -> float64[4, 4], rest matrix in the armature's
+            space.
+        changed: indices of joints of the new file whose bones must be changed.
+
+    Returns:
+        The bone name of each joint of the new file.
     """
     old, new = change.old.armature, change.new.armature
     follow = _followers(edit_bones, kept, gone)
@@ -320,9 +324,11 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Reset the pose of joints that the evaluator moved with the old file.
+    """Reset the pose of joints that the evaluator moves with the old file but not with the new one.
 
-    Joints that the evaluator moves with the new file too are left out.
+    Args:
+        change: the replacement.
+        moved: new index of each old joint; -1 if the new file lacks it.
     """
     owned = change.after.owned
     for joint in change.before.owned:

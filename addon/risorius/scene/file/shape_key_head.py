@@ -138,9 +138,11 @@ def _axes(context: Context) -> Doubles:
 
 
 def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
-    """The neutral mesh of an object without its shape keys; its Mirror modifiers are applied.
+    """The neutral mesh of an object, in centimetres with y up.
 
-    If the object has a shown Mirror modifier, its shape keys are included at their current values.
+    Without a visible Mirror modifier, the result has the positions of the reference shape key. With
+    a visible Mirror modifier, the result is the mesh after the modifier, which includes the shape
+    keys at their current values.
 
     Args:
         context: its scene gives the unit.

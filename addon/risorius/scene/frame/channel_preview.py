@@ -32,7 +32,11 @@ def set_override(rig: ArmatureObject, channel: int, value: float) -> None:
 
 
 def clear(rig: ArmatureObject) -> bool:
-    """End the override of a character. Returns whether there was one."""
+    """End the override of a character.
+
+    Returns:
+        Whether the character had an override.
+    """
     if parts.TEST not in rig:
         return False
     del rig[parts.TEST]
@@ -42,7 +46,8 @@ def clear(rig: ArmatureObject) -> bool:
 def clear_all() -> bool:
     """End the overrides of all characters; the next update evaluates their faces.
 
-    Returns: whether any override ended.
+    Returns:
+        Whether at least one character had an override.
     """
     ended = [rig for rig in parts.rigs() if clear(rig)]
     for rig in ended:

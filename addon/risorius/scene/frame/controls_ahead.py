@@ -5,7 +5,7 @@ Blender evaluates a frame with its simulations, and calls handlers afterwards. V
 write are too late for cloth and hair. So Risorius evaluates the control armatures first in a
 separate graph, and the face has its pose when the frame begins.
 
-The scene of that graph belongs to no file, see `stage`.
+The separate graph has a temporary scene that belongs to no file (base/stage.py).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control arma
 
 # Session uid of a scene of the user -> temporary scene with the controls of the user's scene.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
-# _edited: whether the file may have been edited since the last frame. _simulated: whether the file
-# has a simulation.
+# Two truth values. _edited: whether the file may have been edited since the last frame. _simulated:
+# whether the file has a simulation.
 _edited = session.value("controls_ahead.edited", True, ("undo", "load"))
 _simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
 # Session uids of scenes that Blender evaluated since the last load, undo or redo.
@@ -61,7 +61,11 @@ def is_needed() -> bool:
 
 
 def note_evaluated(scene: bpy.types.Scene) -> None:
-    """Record that Blender has evaluated a scene. Args: scene  the original scene."""
+    """Record that Blender has evaluated a scene.
+
+    Args:
+        scene: the original scene.
+    """
     _evaluated_scenes.add(scene.session_uid)
 
 
@@ -191,7 +195,10 @@ def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
 def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
     """Whether a graph contains the deforming armature of any of the faces.
 
-    Args: whole  True: meshes of the faces count too.
+    Args:
+        graph: the dependency graph.
+        faces: the faces to look for.
+        whole: True: the result is also True if the graph contains a mesh of a face.
     """
     return any(
         item.evaluated_get(graph).is_evaluated

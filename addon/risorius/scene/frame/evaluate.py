@@ -182,7 +182,9 @@ def after_frame(depsgraph: Depsgraph) -> None:
 
 
 def _glance(seen: ArmatureObject) -> tuple[object, ...]:
-    """The inputs of a character that only its control armature moves, for comparison.
+    """Values of the control armature to compare: sliders, bone matrices, position and settings.
+
+    If only the control armature moves a character, these are all inputs of the character.
 
     Args:
         seen: the evaluated control armature.
@@ -199,7 +201,9 @@ def _glance(seen: ArmatureObject) -> tuple[object, ...]:
 def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
     """Whether only the control armature moves a character, without layers, body or other inputs.
 
-    Args: seen  the evaluated control armature.
+    Args:
+        rig: the deforming armature.
+        seen: the evaluated control armature.
     """
     more = lods.by_distance(rig) or parts.TEST in rig or layers.has_any(seen.original)
     more = more or joint_readings.reads(rig)

@@ -27,7 +27,11 @@ Followed = tuple[bpy.types.ID, str]  # a datablock; name of its bone or property
 
 
 def words(cause: str) -> str:
-    """The sentence for the user about a circular dependency. Args: cause  text from `cause`."""
+    """The sentence for the user about a circular dependency.
+
+    Args:
+        cause: name of the circular rotation or constraint, as the function `cause` gives it.
+    """
     return told(
         "{cause} is circular: it follows what the neck poses move. The neck poses follow the "
         "control bones instead.",
@@ -36,7 +40,9 @@ def words(cause: str) -> str:
 
 
 def cause(rig: ArmatureObject, live: runtime.Runtime, joint: int, bone: bpy.types.PoseBone) -> str:
-    """The reason why a joint's rotation depends on itself, as text; empty if it does not.
+    """The name of the rotation or constraint because of which a joint's rotation depends on itself.
+
+    The text is empty if the rotation does not depend on itself.
 
     Args:
         rig: deforming armature.

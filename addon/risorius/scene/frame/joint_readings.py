@@ -90,7 +90,11 @@ def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
 
 
 def reads(rig: ArmatureObject) -> bool:
-    """Whether joint rotations of a face are read from its bones. Args: rig  deforming armature."""
+    """Whether joint rotations of a face are read from its bones.
+
+    Args:
+        rig: deforming armature.
+    """
     live = runtime.of(rig) if parts.BAKED not in rig else None
     return live is not None and bool(live.turning and of(rig, live).places)
 

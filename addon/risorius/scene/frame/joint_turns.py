@@ -3,7 +3,8 @@
 
 RBF poses of the file read these controls to correct neck and jaw when the head turns. Rotations by
 control bones, layers, live capture and a body are known before the frame. If anything else rotates
-a joint, such as a constraint on its bone, Blender must evaluate the bone first: see joint_readings.
+a joint, such as a constraint on its bone, Blender must evaluate the bone before its rotation can be
+read; joint_readings.py finds these joints.
 """
 
 from __future__ import annotations
@@ -23,7 +24,11 @@ _NOTHING = 1e-7  # components of a quaternion up to this size count as 0
 
 
 def has_any(rig: ArmatureObject) -> bool:
-    """Whether a character has raw controls of joint rotations. Args: rig  deforming armature."""
+    """Whether a character has raw controls of joint rotations.
+
+    Args:
+        rig: deforming armature.
+    """
     live = runtime.of(rig)
     return live is not None and bool(live.turning)
 

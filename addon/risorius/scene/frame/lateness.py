@@ -34,9 +34,10 @@ class _Late:
     frames: int = 0
 
 
-# Deforming armature -> record of a face whose controls depend on a face.
+# Session uid of a deforming armature -> record of a face whose controls depend on a face.
 _circles: dict[int, _Late] = session.table("lateness.circles", ("undo", "load"))
-# Deforming armature -> record of a face with a control whose value changed during the frame.
+# Session uid of a deforming armature -> record of a face with a control whose value changed during
+# the frame.
 _others: dict[int, _Late] = session.table("lateness.others", ("undo", "load"))
 
 
@@ -144,7 +145,11 @@ def total() -> int:
 
 
 def forget(rig: ArmatureObject | None = None) -> None:
-    """Forget the records of a face. Args: rig  its deforming armature; None: all faces."""
+    """Forget the records of a face.
+
+    Args:
+        rig: the character's deforming armature; None: all faces.
+    """
     for kept in (_circles, _others):
         if rig is None:
             kept.clear()

@@ -48,7 +48,11 @@ WHOLE = Look()
 
 
 def of(rig: ArmatureObject) -> Look:
-    """The solo and mute setting of a character. Args: rig  its deforming armature."""
+    """The solo and mute setting of a character.
+
+    Args:
+        rig: the character's deforming armature.
+    """
     kept = rig.get(parts.LOOK)
     if not isinstance(kept, str):
         return WHOLE
@@ -141,7 +145,11 @@ def apply(look: Look, pose: native.Pose, live: runtime.Runtime, lod: int) -> Non
 
 
 def take_away() -> bool:
-    """Remove the settings of all characters for a save. Returns: whether there were any."""
+    """Remove the solo and mute settings of all characters before a file is saved.
+
+    Returns:
+        Whether at least one character had a setting.
+    """
     _held.clear()
     for rig in parts.rigs():
         if parts.LOOK in rig:
@@ -152,7 +160,11 @@ def take_away() -> bool:
 
 
 def give_back() -> bool:
-    """Restore the settings that `take_away` removed. Returns: whether it had removed any."""
+    """Restore the solo and mute settings that `take_away` removed.
+
+    Returns:
+        Whether `take_away` had removed at least one setting.
+    """
     given = bool(_held)
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)

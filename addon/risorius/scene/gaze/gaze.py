@@ -40,8 +40,8 @@ class Target:
     Attributes:
         rest: rest position of the target, at which the eyes look ahead.
         moved: vector from the rest position to the target.
-        meet: convergence, 0: the eyes rotate only as far as the direction to the target changes
-            by `moved`; 1: both eyes look at the target itself.
+        meet: convergence, 0 to 1. 0: each eye rotates by the angle by which the direction to the
+            target has changed since rest; 1: both eyes look at the target itself.
     """
 
     rest: Vector
@@ -105,7 +105,7 @@ def moved(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
 
 
 def _middle(seen: ArmatureObject) -> Vector:
-    """The midpoint between the two eye bones at rest."""
+    """The midpoint between the two eye bones at rest, in the armature's space."""
     bones = seen.pose.bones
     heads = [bones[n].bone.head_local for n in ("eye_L", "eye_R") if n in bones]
     return sum(heads, Vector()) / max(len(heads), 1)
@@ -196,7 +196,14 @@ def _error(
 
 
 def _within(live: runtime.Runtime, side: str, angles: Float, maximum: float) -> Float:
-    """Clips yaw and pitch to the angles that an eye's look controls reach at value `maximum`."""
+    """Clip yaw and pitch to the angles that an eye's look controls reach at value `maximum`.
+
+    Args:
+        live: the character's Runtime.
+        side: "L" or "R", side of the eye.
+        angles: float64[2], yaw and pitch in radians.
+        maximum: largest value of a look control.
+    """
     low, high = np.zeros(2), np.zeros(2)
     for _index, *at_one in live.look[side]:
         low = np.minimum(low, np.array(at_one) * maximum)
@@ -263,7 +270,8 @@ def frame_of(
 def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion]) -> Float | None:
     """float64[3, 3]: rotation in the armature's axes that a joint gets from the neck or head bone.
 
-    None if the joint gets none. The neck joints share the neck's rotation equally.
+    None if neither bone rotates the joint. The neck joints share the rotation of the neck bone
+    equally.
     """
     if joint == live.anchors.head and "head" in turns:
         return np.array(turns["head"].to_matrix())

@@ -24,7 +24,7 @@ class Coil(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """Number and shape of the strands that follow a card."""
+    """Number and shape of the strands that follow a card of one kind of hair, such as brows."""
 
     each: int  # strands per card
     radius: float  # metres, near the root
@@ -34,8 +34,9 @@ class Kind(NamedTuple):
     # widths beyond either edge, and up to `along` metres before the root of the card.
     aside: float
     along: float
-    # Dense hair has fibres that pass light on to each other. Single hairs over skin only use the
-    # colour of the cards' image, because such fibres would be too dark there.
+    # True: the material has fibres that pass light on to each other, as in dense hair. False: the
+    # material only has the colour of the cards' image, because single fibres over skin would be too
+    # dark.
     dense: bool
     root: float = 1.0  # radius at the root / `radius`, which is reached at 1/5 of the length
     coil: Coil | None = None

@@ -72,7 +72,8 @@ def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
         fibre.model = "CHIANG"
     fibre.parametrization = "COLOR"
     fibre.inputs["Roughness"].default_value = 0.55
-    # As for oiled hair; with 1.55, light from behind would make the hair grey.
+    # 1.3 is a value for oiled hair. With Blender's default 1.55, light from behind would make the
+    # hair grey.
     fibre.inputs["IOR"].default_value = 1.3
     if colour is not None:
         # The image shows the light of many fibres together, so a single fibre gets a darker colour.

@@ -62,12 +62,25 @@ class _Tree:
         return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
 
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
-        """A random value from low to high for each value of `number`."""
+        """A field of random values from low to high; equal values of `number` give equal values.
+
+        Args:
+            low, high: range of the values.
+            seed: another seed gives other values.
+            number: field of integers.
+        """
         node = self.node("FunctionNodeRandomValue", {2: low, 3: high, "ID": number, "Seed": seed})
         return node.outputs[1]
 
     def taken(self, mesh: object, value: object, index: object, kind: str) -> Socket:
-        """Samples a value at vertex `index` of the mesh; `kind` is the data type of the value."""
+        """Sample a value at one vertex of a mesh.
+
+        Args:
+            mesh: the mesh.
+            value: the field to sample.
+            index: index of the vertex.
+            kind: data type of the value, such as "FLOAT_VECTOR".
+        """
         node = self.node("GeometryNodeSampleIndex", data_type=kind, domain="POINT")
         self.put(mesh, node.inputs[0])
         self.put(value, next(s for s in node.inputs if s.name == "Value" and s.enabled))
@@ -75,7 +88,7 @@ class _Tree:
         return next(s for s in node.outputs if s.enabled)
 
     def between(self, a: object, b: object, share: object) -> Socket:
-        """Mixes two vectors; a share below 0 or above 1 extrapolates."""
+        """Mix two vectors: share 0 gives `a`, 1 gives `b`, a share outside 0 to 1 extrapolates."""
         node = self.node("ShaderNodeMix", data_type="VECTOR", clamp_factor=False)
         where = {s.identifier: s for s in node.inputs}
         for value, name in ((share, "Factor_Float"), (a, "A_Vector"), (b, "B_Vector")):
@@ -164,7 +177,8 @@ def _lines(g: _Tree, count: int, rows: int) -> Node:
 def _aside(g: _Tree, lock: Socket, most: float) -> Node:
     """A random displacement of each lock, up to `most` Blender units along each axis.
 
-    Returns: a node that scales the displacement; the caller connects its input Scale.
+    Returns:
+        A node that scales the displacement; the caller connects the input Scale of the node.
     """
     parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
     parted.inputs["Min"].default_value = [-most] * 3
@@ -285,7 +299,7 @@ def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
 
 
 def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: float) -> Node:
-    """Wind strands about their path. Returns: the last node.
+    """Wind strands about their path.
 
     The strands of a lock start at nearly the same angle, so that they stay together.
 
@@ -296,6 +310,9 @@ def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: 
         kind: kind of strands.
         coil: radius and pitch of the winding.
         unit: metres per Blender unit.
+
+    Returns:
+        The last of the added nodes, whose output has the wound curves.
     """
     radius, pitch = coil.radius / unit, coil.pitch / unit
     finer = g.node("GeometryNodeResampleCurve", {"Curve": curves, "Count": points})

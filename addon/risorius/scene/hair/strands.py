@@ -55,13 +55,16 @@ def are_shown(rig: ArmatureObject) -> bool:
 
 
 def show(rig: ArmatureObject, unit: float) -> int:
-    """Let renders of a character show strands. Returns: the number of meshes with strands.
+    """Let renders of a character show strands.
 
     Meshes of cards that are hidden in renders get no strands.
 
     Args:
         rig: the deforming armature.
         unit: metres per Blender unit.
+
+    Returns:
+        The number of meshes with strands.
     """
     count = 0
     live = runtime.of(rig)

@@ -129,7 +129,7 @@ def move(
 
     Args:
         rig: the character.
-        now, goal: start and goal.
+        now, goal: the pose from which, and the pose towards which the controls move.
         factor: 1 reaches the goal, 0 changes nothing, below 0 moves away from the goal.
         paths: data paths of the controls to move.
 

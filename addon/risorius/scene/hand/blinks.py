@@ -34,7 +34,12 @@ class Blink:
     sides: str = "LR"
 
     def begin(self, frame: float, side: str) -> float:
-        """The frame at which an eye begins to close. Args: frame  of the blink, side  L or R."""
+        """The frame at which an eye begins to close.
+
+        Args:
+            frame: frame at which the blink begins.
+            side: "L" or "R", side of the eye.
+        """
         return frame + (self.offset if side == "R" else 0.0)
 
     def keys(self, begin: float, before: float, after: float) -> list[tuple[float, float]]:
@@ -55,7 +60,12 @@ class Blink:
 
 
 def sliders(live: runtime.Runtime, sides: str) -> dict[str, str]:
-    """The sliders that close the eyes, by side. Args: live  the Runtime, sides  L, R or both."""
+    """Side "L" or "R" -> name of the slider that closes the eye of this side.
+
+    Args:
+        live: Runtime of the character.
+        sides: "L", "R" or "LR"; a side whose slider the face lacks is left out of the result.
+    """
     found = {side: live.lids.get(f"eyeBlink{side}") for side in sides}
     return {side: live.labels[i] for side, i in found.items() if i is not None}
 

@@ -49,7 +49,7 @@ def start(rig: ArmatureObject, settings: Settings) -> Session:
     """Start the live capture of a character, and end an earlier capture of the same character.
 
     Args:
-        rig: its deforming armature.
+        rig: the character's deforming armature.
         settings: settings of the capture.
 
     Returns:
@@ -102,8 +102,11 @@ def _end(session: Session) -> None:
 
 
 def _lay_by(session: Session) -> Recording | None:
-    """End a session's recording and keep it in `recordings`. Returns: the recording, or None if
-    nothing was recorded."""
+    """End a session's recording and keep it in the list of waiting recordings.
+
+    Returns:
+        The recording; None if nothing was recorded.
+    """
     recording, session.recording = session.recording, None
     if recording is None or not len(session.receiver.finish(recording.take)):
         return None
@@ -150,7 +153,11 @@ def finish_take(
 
 
 def _tick() -> float | None:
-    """Called by the timer. Returns: seconds until the next call; None ends the timer."""
+    """The function of the timer: write the newest captured faces to the characters.
+
+    Returns:
+        Seconds until the next call; None ends the timer.
+    """
     try:
         return _beat()
     except Exception:
@@ -202,7 +209,10 @@ def _before_load(*_arguments: object) -> None:
 
 @persistent
 def _before_save(*_arguments: object) -> None:
-    """Save the face with its values before the capture; the next tick shows the capture again."""
+    """Restore the values that faces had before the capture, so that the file stores these values.
+
+    The next call of the timer shows the capture again.
+    """
     for session in sessions.running():
         controls = session.controls()
         if controls is not None:

@@ -103,7 +103,12 @@ def _rotation(bone: bpy.types.PoseBone) -> tuple[str, tuple[float, ...]]:
 
 
 def _as_quaternion(mode: str, values: Sequence[float]) -> Quaternion:
-    """Convert a result of _rotation to a quaternion."""
+    """Convert a rotation to a quaternion.
+
+    Args:
+        mode: rotation mode of a bone.
+        values: values of the rotation in this mode.
+    """
     if mode == "QUATERNION":
         return Quaternion(values).normalized()
     if mode == "AXIS_ANGLE":

@@ -22,7 +22,7 @@ from .recordings import Recording
 
 # Session uid of a control armature -> Session.
 _sessions: dict[int, Session] = registry.table("sessions.sessions", ("unregister",))
-# (source, port, host) -> the Receiver that the sessions with this address share
+# (kind of source, port, host) -> the Receiver that all sessions with these three settings share.
 _receivers: dict[tuple[str, int, str], native.Receiver] = registry.table(
     "sessions.receivers", ("unregister",)
 )
@@ -171,7 +171,8 @@ def _reserve(key: tuple[str, int, str]) -> None:
 def neutral_now(session: Session) -> bool:
     """Use the newest received face as neutral face, which is subtracted from all later faces.
 
-    Returns: whether a face was received.
+    Returns:
+        Whether the session has received a face.
     """
     frame = session.receiver.latest(session.subject)
     if frame is None:

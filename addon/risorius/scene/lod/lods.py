@@ -19,7 +19,11 @@ def built(rig: ArmatureObject) -> list[int]:
 
 
 def levels_of(item: MeshObject) -> list[int]:
-    """The levels that show a mesh. Args: item  the mesh object."""
+    """The levels that show a mesh.
+
+    Args:
+        item: the mesh object.
+    """
     return saved.wholes(item, parts.LODS, 0, _COARSEST)
 
 
@@ -36,7 +40,8 @@ def shows(item: MeshObject, level: int) -> bool:
 def heads(rig: ArmatureObject) -> list[MeshObject]:
     """The head meshes of the finest existing level; all meshes of this level if none is a head.
 
-    Args: rig  the deforming armature.
+    Args:
+        rig: the deforming armature.
     """
     items = parts.meshes_of(rig)
     first = min((min(levels_of(item), default=0) for item in items), default=0)
@@ -67,7 +72,7 @@ def show(rig: ArmatureObject, viewport: int | None = None, render: int | None = 
     Args:
         rig: the deforming armature.
         viewport: level of the viewport; None: unchanged.
-        render: level of renders, SAME to follow the viewport; None: unchanged.
+        render: level of renders; SAME: the level of the viewport; None: unchanged.
     """
     if viewport is not None:
         rig[parts.LOD] = int(viewport)
@@ -79,7 +84,7 @@ def show(rig: ArmatureObject, viewport: int | None = None, render: int | None = 
 
 
 def distances(rig: ArmatureObject) -> list[float]:
-    """Camera distances in Blender units at which each level changes to the next one.
+    """The distances from the camera, in Blender units, at which the next coarser level is shown.
 
     Args:
         rig: the deforming armature.
@@ -93,7 +98,8 @@ def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) 
     Args:
         rig: the deforming armature.
         enable: True: on; False: off.
-        size: size of the face in Blender units, for initial distances; None: 0.25.
+        size: size of the face in Blender units, from which the distances are computed if the
+            face has none; None: 0.25.
     """
     levels = built(rig)
     if enable and levels and not distances(rig):
@@ -154,8 +160,13 @@ def _distance(seen: ArmatureObject, camera: bpy.types.Object) -> float:
 def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
     """Hide the meshes of other levels; meshes that the user hid stay hidden.
 
-    `flag` is the name of the property that hides a mesh in the viewport or in renders. If its value
-    differs from the last written value, the user has set it.
+    If the value of the flag on a mesh differs from the value that the add-on wrote last, the user
+    has set it.
+
+    Args:
+        rig: the deforming armature.
+        level: the level of detail to show.
+        flag: property that hides a mesh: "hide_viewport" or "hide_render".
     """
     for item in parts.meshes_of(rig):
         written, users = f"{parts.HIDDEN_PREFIX}{flag}", f"{parts.HIDDEN_PREFIX}user_{flag}"

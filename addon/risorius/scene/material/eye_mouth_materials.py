@@ -237,7 +237,15 @@ def _shade(graph: Graph) -> Socket:
 
 
 def _shine(graph: Graph, shade: Socket | None, coat: float, gloss: float) -> None:
-    """Set the wet coat and the gloss of the surface under it, both weaker where `shade` is dark."""
+    """Set the wet coat of a surface, and the gloss of the surface under the coat.
+
+    Args:
+        graph: Graph of the material.
+        shade: colour whose red channel scales coat and gloss, so that both are weaker in the dark
+            parts of the mouth; None: no scaling.
+        coat: weight of the coat, 0 to 1.
+        gloss: specular level of the surface.
+    """
     if shade is None:
         graph.set(Coat_Weight=coat, Specular_Ior_Level=gloss)
         return

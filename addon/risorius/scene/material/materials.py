@@ -203,7 +203,9 @@ def _add_attributes(
 ) -> set[str]:
     """Write the mesh attributes that the material of a mesh reads.
 
-    Returns: the areas of a face that a skin mesh has; empty for other meshes.
+    Returns:
+        Names of the areas of a face, such as the forehead, that a skin mesh has; empty for other
+        meshes.
     """
     if not len(plan.positions):
         return set()

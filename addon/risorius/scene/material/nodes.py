@@ -62,7 +62,7 @@ class Graph:
             self.put(value, self.shader.inputs[name.replace("_", " ").replace("Ior", "IOR")])
 
     def math(self, operation: str, *values: Value, clamp: bool = False) -> Socket:
-        """Add a Math node. Returns: its output.
+        """Add a Math node, and return its output socket.
 
         Args:
             operation: operation of Blender's Math node, such as "ADD".
@@ -88,8 +88,9 @@ class Graph:
         return self.math("ADD", result, 0.0, clamp=True) if clamp and values else result
 
     def vector(self, operation: str, *values: Value) -> Socket:
-        """Add a Vector Math node. Returns: its vector output, or its number for LENGTH, DISTANCE
-        and DOT_PRODUCT.
+        """Add a Vector Math node, and return its output socket.
+
+        The output is a number for LENGTH, DISTANCE and DOT_PRODUCT, a vector for other operations.
 
         Args:
             operation: operation of Blender's Vector Math node, such as "ADD".
@@ -136,7 +137,7 @@ class Graph:
         self.put(b, where[f"B_{kind}"])
 
     def ramp(self, factor: Value, *stops: tuple[float, Color]) -> Socket:
-        """Add a colour ramp. Returns: its colour.
+        """Add a colour ramp node, and return its colour output.
 
         Args:
             factor: position on the ramp, 0 to 1.
@@ -211,7 +212,10 @@ class Graph:
     def rest_points(self, size: NDArray[np.float64]) -> Socket:
         """Coordinates on the undeformed mesh, in Blender units from a corner of its bounding box.
 
-        Patterns at these coordinates move with the skin. `size`: float64[3], extent of the mesh.
+        Patterns at these coordinates move with the skin.
+
+        Args:
+            size: float64[3], extent of the mesh in Blender units.
         """
         generated = self.node("TexCoord").outputs["Generated"]
         return self.vector("MULTIPLY", generated, tuple(float(s) for s in size))
@@ -261,7 +265,9 @@ class Graph:
         return node.outputs["Normal"]
 
     def tidy(self) -> None:
-        """Arrange the nodes in columns by the largest number of links between node and output."""
+        """Arrange the nodes in columns: a node's column is the largest number of links on a path
+        from the node to the output node.
+        """
         sources = defaultdict(list)  # collected once, because socket.links searches the whole tree
         for link in self.tree.links:
             sources[link.to_node].append(link.from_node)
@@ -277,7 +283,7 @@ class Graph:
             rows[place] = rows.get(place, 0) + 1
 
     def _sources_first(self, sources: Mapping[Node, list[Node]]) -> list[Node]:
-        """Nodes connected to the output, each after its sources.
+        """The nodes that feed the output node, sorted: a node comes after all nodes that feed it.
 
         Args:
             sources: node -> the nodes that are linked to its inputs.

@@ -44,9 +44,9 @@ Member = tuple[str, Value]  # side of the face, value of the map
 
 
 class Bucket(NamedTuple):
-    """An effect on the skin: reddening, a texture set, or folds.
+    """One effect that animated maps can have on the skin: reddening, a texture set, or folds.
 
-    The values of the animated maps with the same effect are added.
+    If several animated maps have the same effect, their values are added.
     """
 
     kind: str  # "flush", "color", "normal" or "bump"

@@ -179,7 +179,11 @@ def _moves_of(
 
 
 def millimetres(rig: ArmatureObject) -> float:
-    """Millimetres per Blender unit of a face. Args: rig  its deforming armature."""
+    """Millimetres per Blender unit of a face.
+
+    Args:
+        rig: the character's deforming armature.
+    """
     return runtime.unit_of(rig) * 1000.0
 
 

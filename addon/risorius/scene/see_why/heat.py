@@ -60,7 +60,11 @@ class Heat:
 
 
 def of(rig: ArmatureObject) -> Heat | None:
-    """The heat map that a character shows, or None. Args: rig  the deforming armature."""
+    """The heat map that a character shows, or None.
+
+    Args:
+        rig: the deforming armature.
+    """
     kind, *rest = saved.text(rig, parts.HEAT).split("\n", 2)
     try:
         most, what = float(rest[0]), rest[1]
@@ -75,7 +79,7 @@ def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Hea
     The choice is stored on the deforming armature, and a timer updates the colours from then on.
 
     Args:
-        rig: its deforming armature.
+        rig: the character's deforming armature.
         kind: "CONTROL", "POSE", "CORRECTIVE" or "LAYER".
         what: label of the control, index of the corrective, or index of the layer; not used for
             "POSE".
@@ -172,14 +176,19 @@ def _poses(pose: native.Pose) -> causes.Poses:
 
 
 def _state(now: present.Present, kind: str) -> object:
-    """The values on which the colours of a heat map depend."""
+    """The values on which the colours of a heat map depend, compared to notice changes.
+
+    These are the LOD and, for all kinds of heat maps except CONTROL, the raw controls, solo and
+    mute.
+    """
     return (now.lod, None) if kind == "CONTROL" else (now.lod, now.raw.tobytes(), now.look)
 
 
 def _write(item: MeshObject, shares: NDArray[np.float64]) -> None:
     """Write the colours of a heat map as the active colour attribute of a mesh.
 
-    Args: shares  float64[V], 0 for the coldest colour to 1 for the hottest.
+    Args:
+        shares: float64[V], 0 for the coldest colour to 1 for the hottest.
     """
     held = item.data.color_attributes
     layer: Attribute = held.get(parts.HEAT)
@@ -220,7 +229,7 @@ def hide(rig: ArmatureObject) -> bool:
     The settings of the 3D views are restored if no other face has a heat map.
 
     Args:
-        rig: its deforming armature.
+        rig: the character's deforming armature.
 
     Returns:
         Whether the character had a heat map.
@@ -282,11 +291,14 @@ def follow_undo() -> None:
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
     """Update the colours of a character if its pose, LOD, solo or mute changed.
 
-    The colours of a CONTROL depend on the LOD alone. Returns: whether an update was necessary.
+    The colours of a heat map of kind CONTROL depend on the LOD alone.
 
     Args:
-        rig: its deforming armature, with a heat map.
+        rig: the character's deforming armature, with a heat map.
         depsgraph: graph for reading layers.
+
+    Returns:
+        Whether the colours were out of date and were updated.
     """
     heat, now = of(rig), present.of(rig)
     if heat is None or now is None or _shown.get(rig.session_uid) == _state(now, heat.kind):
@@ -309,9 +321,14 @@ def watch() -> None:
 
 
 def _look() -> float | None:
-    """Called by the timer: update the colours of changed poses. The pause is at least three times
-    the duration of the update, so that updates take at most a quarter of the time. Returns: seconds
-    until the next call; None ends the timer."""
+    """The function of the timer: update the heat maps of faces whose pose has changed.
+
+    The pause until the next call is at least three times the duration of the update, so that
+    updates take at most a quarter of the time.
+
+    Returns:
+        Seconds until the next call; None ends the timer.
+    """
     begin = perf_counter()
     shown = [rig for rig in parts.rigs() if parts.HEAT in rig]
     if not shown:

@@ -37,7 +37,8 @@ class Row(NamedTuple):
             words; "" if it was not recognised.
         is_known: whether the name of the key is known, regardless of the user's assignment.
         is_said: whether the user assigned the key.
-        holder: of an OWN key, the other key that has the control that this key means; "" for none.
+        holder: name of another key. The name of an OWN key may mean a standard control that is
+            assigned to this other key already; "" if there is no such key.
     """
 
     key: str
@@ -149,7 +150,11 @@ def _names(names: tuple[str, ...], muted: frozenset[str], text: str) -> Names:
 
 
 def _wanted(said: Said) -> tuple[str, ...]:
-    """The controls of a user's assignment. Args: said  the assignment."""
+    """The raw controls, without prefix, that a user's assignment names.
+
+    Args:
+        said: the assignment as it is stored.
+    """
     controls: tuple[str, ...] = native.part("author.input.said").meaning_of(said).controls
     return controls
 
@@ -217,7 +222,11 @@ def choices() -> tuple[Choice, ...]:
 
 @session.cached(("unregister",), 512)
 def unit_of(controls: tuple[str, ...]) -> str:
-    """The ARKit unit that drives exactly these controls, or "". Args: controls  without prefix."""
+    """The ARKit unit that drives exactly these controls, or "".
+
+    Args:
+        controls: names of raw controls, without prefix.
+    """
     prefix, meant = native.part("controls.vocabulary").PREFIX, set(controls)
     for unit, row in native.part("controls.arkit").mapping().items():
         if {name.removeprefix(prefix) for name in row} == meant:

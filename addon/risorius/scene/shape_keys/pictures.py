@@ -92,7 +92,8 @@ def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
 def model_of(item: MeshObject) -> Model:
     """Read the data for the pictures of a head, and store the paths for `paths_of`.
 
-    Args: item  mesh with shape keys.
+    Args:
+        item: mesh with shape keys.
     """
     keys, mesh = parts.keys_there(item), item.data
     turn = np.array(item.matrix_world.to_3x3(), np.float64)
@@ -155,7 +156,8 @@ def _to_front(rest: Floats, far: Floats) -> Floats:
 
     Args:
         rest: float64[V, 3], vertices of the neutral head, z up.
-        far: float64[V], from _shares.
+        far: float64[V], how far shape keys move each vertex, relative to the largest motion, 0 to
+            1.
     """
     middle = (rest.min(axis=0) + rest.max(axis=0)) / 2
     way = (far[:, None] * (rest - middle)).sum(axis=0)[:2]
@@ -172,7 +174,8 @@ def _frame(rest: Floats, far: Floats) -> tuple[Floats, float]:
 
     Args:
         rest: float64[V, 3], vertices of the neutral head, which faces -y.
-        far: float64[V], from _shares.
+        far: float64[V], how far shape keys move each vertex, relative to the largest motion, 0 to
+            1.
     """
     low, high = rest.min(axis=0), rest.max(axis=0)
     moved = rest[far > _MOVES]

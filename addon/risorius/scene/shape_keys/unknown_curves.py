@@ -34,7 +34,11 @@ class Unknown:
 
 
 def of(controls: ArmatureObject) -> Unknown | None:
-    """The unknown curves of a face's last import, or None. Args: controls  its control armature."""
+    """The unknown curves of a face's last import, or None.
+
+    Args:
+        controls: the character's control armature.
+    """
     return _parsed(saved.text(controls, parts.CURVES))
 
 

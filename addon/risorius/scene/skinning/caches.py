@@ -100,7 +100,7 @@ def note_old(rig: ArmatureObject) -> bool:
 
 
 def look() -> None:
-    """Remove freed caches from the record. Costs nothing if no cache is recorded."""
+    """Remove freed caches from the record of late caches; quick if no cache is recorded."""
     if any(_late.values()):
         there = {key for scene in bpy.data.scenes for key in _baked(scene)}
         for keys in _late.values():

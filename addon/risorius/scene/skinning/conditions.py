@@ -62,19 +62,21 @@ class _Kept:
 
 # Session uid of a deforming armature -> its plan.
 _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
-# Mesh object -> number of the add-on's last write to it. The update that reports this write does
-# not count as an edit.
+# Session uid of a mesh object -> sequence number of the add-on's last write to the mesh. The update
+# that reports this write does not count as an edit.
 _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
-# Scene and view layer -> number of the last write that an update of the layer's graph reported.
+# (session uid of a scene, name of a view layer) -> sequence number of the last write that an update
+# of the layer's dependency graph reported.
 _told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
 _restored = session.value("conditions.restored", False, ("load",))
-# Datablock that is no object -> number of its drivers when it was last updated.
+# Session uid of a datablock other than an object -> number of its drivers when it was last updated.
 _drivers: dict[int, int] = session.table("conditions.drivers", ("undo", "load"))
-# Object outside of characters -> its parent, the targets of its constraints and modifiers, and the
-# number of its drivers, when it was last updated.
+# Session uid of an object outside of characters -> its parent, the targets of its constraints and
+# modifiers, and the number of its drivers, when it was last updated.
 _pointing: dict[int, tuple[object, ...]] = session.table("conditions.pointing", ("undo", "load"))
-# Deforming armature -> number of nested calls of hold_ordinary.
+# Session uid of a deforming armature -> number of calls of hold_ordinary that have begun and not
+# ended.
 _ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
 
 
@@ -131,7 +133,11 @@ def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
 
 
 def note_written(item: MeshObject) -> None:
-    """Record that the add-on wrote a mesh, which is not an edit. Args: item  the mesh object."""
+    """Record that the add-on wrote a mesh, which is not an edit.
+
+    Args:
+        item: the mesh object.
+    """
     _writes.now += 1
     _written[item.session_uid] = _writes.now
 
@@ -163,8 +169,8 @@ class _Edits:
     """The datablocks that an update reports as edited.
 
     Attributes:
-        told: number of the add-on's last write to a mesh that an earlier update of the same
-            dependency graph reported.
+        told: sequence number of the add-on's last write to a mesh that an earlier update of the
+            same dependency graph reported.
         meshes: session uids of characters' mesh objects that anyone but this add-on edited.
         rigs: session uids of edited deforming armatures, and of their data.
         foreign: whether an object outside all characters was edited.
@@ -176,7 +182,12 @@ class _Edits:
     foreign: bool = False
 
     def add(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.ID) -> None:
-        """Add an edited datablock. Args: update  its update; item  the original datablock."""
+        """Add an edited datablock.
+
+        Args:
+            update: Blender's report of the edit.
+            item: the original (not evaluated) datablock.
+        """
         if isinstance(item, bpy.types.Armature):
             self.rigs.add(item.session_uid)
         elif isinstance(item, bpy.types.Object):

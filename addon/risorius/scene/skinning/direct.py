@@ -112,7 +112,11 @@ _faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "lo
 
 
 def unsettle(rig: ArmatureObject) -> None:
-    """Let `settle` check the modes of a face's meshes again. Args: rig  deforming armature."""
+    """Let `settle` check the modes of a face's meshes again.
+
+    Args:
+        rig: deforming armature.
+    """
     _settled.pop(rig.session_uid, None)
 
 

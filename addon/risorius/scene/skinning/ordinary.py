@@ -76,7 +76,11 @@ def _finished_meshes(rig: ArmatureObject) -> list[MeshObject]:
 
 
 def take_off(rigs: Iterable[ArmatureObject]) -> None:
-    """Switch faces back into Direct mode after `take_on`. Args: rigs  the same armatures."""
+    """Switch faces back into Direct mode after `take_on`.
+
+    Args:
+        rigs: the deforming armatures that `take_on` got.
+    """
     for rig in rigs:
         for item in parts.meshes_of(rig):
             points = _finished.pop(item.session_uid, None)

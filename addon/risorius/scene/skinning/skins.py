@@ -70,15 +70,20 @@ _edited: set[int] = session.keep("skins.edited", set, ("load",))
 
 @session.at("undo")
 def doubt() -> None:
-    """Have each cached skin compared with its mesh at its next use, because undo may change meshes.
+    """Let `of` compare each cached skin with its mesh before the skin is used again.
 
-    Meshes that were not edited since the file was opened need no comparison.
+    This is necessary after undo and redo, which may change meshes. Meshes that were not edited
+    since the file was opened need no comparison.
     """
     _unsure.update(_edited & _skins.keys())
 
 
 def forget(uids: set[int]) -> None:
-    """Forget the skins of edited meshes. Args: uids  session uids of the mesh objects."""
+    """Forget the skins of edited meshes.
+
+    Args:
+        uids: session uids of the mesh objects.
+    """
     _edited.update(uids)
     for uid in uids:
         _skins.pop(uid, None)
@@ -86,12 +91,20 @@ def forget(uids: set[int]) -> None:
 
 
 def forget_bones(uid: int) -> None:
-    """Forget bones that were edited or posed. Args: uid  session uid of the deforming armature."""
+    """Forget bones that were edited or posed.
+
+    Args:
+        uid: session uid of the deforming armature.
+    """
     _bones.pop(uid, None)
 
 
 def bones_of(rig: ArmatureObject) -> Bones:
-    """Read the bones of an armature, or return the cached Bones. Args: rig  deforming armature."""
+    """Read the bones of an armature, or return the cached Bones.
+
+    Args:
+        rig: deforming armature.
+    """
     kept = _bones.get(rig.session_uid)
     if kept is None or len(kept.names) != len(rig.pose.bones):
         kept = _bones[rig.session_uid] = _read_bones(rig)

@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 
 class Row(Protocol):
-    """The members of RISORIUS_PG_sound that this module uses."""
+    """A sound in the list of a voice: the members of RISORIUS_PG_sound that this module uses."""
 
     begin: float
     name: str
@@ -44,7 +44,7 @@ class Row(Protocol):
 
 
 class Rows(Protocol):
-    """The methods of a Blender collection of sounds that this module uses."""
+    """The list of a voice's sounds: the methods of Blender's collection that this module uses."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, place: int) -> Row: ...
@@ -54,7 +54,7 @@ class Rows(Protocol):
 
 
 class Spoken(Protocol):
-    """The members of RISORIUS_PG_spoken."""
+    """The stored data of a voice: the members of RISORIUS_PG_spoken."""
 
     sounds: Rows
     active: int  # index of the chosen sound
@@ -159,7 +159,11 @@ def _packed(sounds: Sequence[Sound]) -> str:
 
 
 def _built(action: bpy.types.Action) -> list[Sound]:
-    """The sounds from which the keys were made. Raises SpokenError if they are lost."""
+    """The sounds from which the current keys of the mouth were made.
+
+    Raises:
+        SpokenError: the sounds are lost.
+    """
     try:
         found = [Sound(float(begin), str(name)) for begin, name in json.loads(of(action).built)]
     except (ValueError, TypeError):
@@ -223,8 +227,14 @@ def trouble(action: bpy.types.Action) -> str:
 
 
 def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
-    """Check that the voice of an action can be corrected. Returns: data path -> curve. Raises
-    SpokenError with the reason if it cannot."""
+    """Check that the voice of an action can be corrected.
+
+    Returns:
+        Data path -> F-curve, for all F-curves of the action.
+
+    Raises:
+        SpokenError: the voice cannot be corrected; the text gives the reason.
+    """
     said = of(action)
     begins = [row.begin for row in said.sounds]
     if not begins:
@@ -283,13 +293,25 @@ class _Mouth:
         return min(max(at, 0.0), self.said.samples - 1.0)
 
     def window(self, begin: float, end: float) -> tuple[int, int]:
-        """The samples that a change between two frames can affect: (first, last + 1)."""
+        """The samples whose values can change if sounds between two frames of the action change.
+
+        Returns:
+            The number of the first sample, and the number of the last sample plus 1.
+        """
         far = _REACH * self.said.fps
         first, last = int(self.sample(begin - far)), int(np.ceil(self.sample(end + far)))
         return first, last + 1
 
     def curves(self, sounds: Sequence[Sound], first: int, last: int) -> dict[str, Floats]:
-        """Control -> float64[last - first], its values at the samples from first to last - 1."""
+        """The values of the mouth's controls at a range of samples.
+
+        Args:
+            sounds: all sounds of the voice.
+            first, last: the range: sample `first` to sample `last` - 1.
+
+        Returns:
+            Name of a control -> float64[last - first], its values.
+        """
         said = self.said
         times = np.arange(first, last) / said.rate
         ends = [*(sound.begin for sound in sounds[1:]), said.end]
@@ -393,12 +415,13 @@ def _turn(
     left: Floats | None = None,
     right: Floats | None = None,
 ) -> None:
-    """Set the handle of a key that points into the replaced span; its other handle is unchanged.
+    """Set the handle of a key that points into the replaced span; the key's other handle stays.
 
     Args:
         key: the key.
         bent: True: Bezier interpolation; False: linear.
-        left, right: new position of the handle, frame and value; None: unchanged.
+        left, right: new end of the left or right handle, as frame and value; None: this handle
+            stays.
     """
     kept = key.handle_left[:], key.handle_right[:]
     if bent:

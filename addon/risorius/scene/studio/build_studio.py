@@ -117,7 +117,9 @@ def _eyes(rig: ArmatureObject) -> np.ndarray:
 def _guess(corners: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, float]:
     """Guess the midpoint between the eyes, and the distance between the eyes.
 
-    Args: corners  float64[n, 3], corners of bounding boxes, axes  float64[3, 3], axes of the head.
+    Args:
+        corners: float64[n, 3], corners of the bounding boxes of the face's meshes.
+        axes: float64[3, 3], the columns are the axes of the head in the space of the corners.
     """
     inside = corners @ axes
     low, high = inside.min(axis=0), inside.max(axis=0)
@@ -150,7 +152,10 @@ def _lamp(name: str, lamp: studio_plan.Lamp, place: Matrix) -> bpy.types.Object:
 
 
 def _looking(place: studio_plan.Triple, target: studio_plan.Triple) -> Matrix:
-    """The matrix of a camera or lamp at a position, directed at a target, all in one space."""
+    """The matrix of a camera or lamp at the position `place` that points at the position `target`.
+
+    The two positions and the matrix are in the same space.
+    """
     way = Vector(target) - Vector(place)
     return Matrix.Translation(Vector(place)) @ way.to_track_quat("-Z", "Y").to_matrix().to_4x4()
 
@@ -190,7 +195,11 @@ def _paper(name: str, glow: float) -> bpy.types.Material:
 
 
 def _falloff(tree: NodeTree, glow: float) -> bpy.types.NodeSocket:
-    """The colour at distance r from the middle: exp(-(r / glow)^2) mixes from _EDGE to _MIDDLE."""
+    """Add nodes for the colour of the backdrop, and return the output socket of the colour.
+
+    At the distance r from the middle of the backdrop, the factor exp(-(r / glow)^2) mixes the
+    colour of the edge (factor 0) and the colour of the middle (factor 1).
+    """
     nodes, links = tree.nodes, tree.links
     where = nodes.new("ShaderNodeTexCoord")
     length = nodes.new("ShaderNodeVectorMath")

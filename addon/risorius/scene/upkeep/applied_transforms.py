@@ -49,8 +49,14 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Moved:
-    """A part with its state before a step, and its world matrix before (`stood`) and after it
-    (`stands`)."""
+    """A part of a face with its positions before and after a step of Blender.
+
+    Attributes:
+        item: the part.
+        before: state of the part before the step.
+        stood, stands: matrix of the part before and after the step, in world space, or relative to
+            a parent that does not belong to the face.
+    """
 
     item: bpy.types.Object
     before: _Seen
@@ -65,7 +71,11 @@ _said: dict[int, Sentence] = session.table("applied_transforms.said", ("undo", "
 
 
 def last_said(rig: ArmatureObject) -> Sentence | None:
-    """The sentence about the last undone step, or None. Args: rig  the face's armature."""
+    """The sentence about the last undone step, or None.
+
+    Args:
+        rig: the deforming armature of the face.
+    """
     return _said.get(rig.session_uid)
 
 
@@ -200,12 +210,15 @@ def _local(seen: _Seen) -> Matrix:
 
 
 def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object]) -> bool:
-    """Undo the changes of one part. Returns whether there were any.
+    """Undo the changes that a step of Blender, such as Apply Transform, made to one part.
 
     Args:
         moved: the part with its state before the step.
         now: the state after the step.
         members: the parts of the face.
+
+    Returns:
+        Whether a change was undone.
     """
     item, before = moved.item, moved.before
     if before.parent != now.parent:
@@ -235,7 +248,11 @@ def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object])
 
 def _clear_deltas(rig: ArmatureObject) -> bool:
     """Move the delta transforms of a rig into its transform, because Apply Transform gives wrong
-    results with deltas. Returns whether there were any."""
+    results for an object with delta transforms.
+
+    Returns:
+        Whether the rig had a delta transform.
+    """
     neutral = Vector(), Euler(), Quaternion(), Vector((1.0, 1.0, 1.0))
     names = ("location", "rotation_euler", "rotation_quaternion", "scale")
     if all(getattr(rig, f"delta_{n}") == v for n, v in zip(names, neutral, strict=True)):

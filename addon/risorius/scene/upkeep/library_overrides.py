@@ -127,7 +127,14 @@ def is_locked(item: MeshObject) -> bool:
 
 def unlock_shapes(rig: ArmatureObject) -> bool:
     """Copy all meshes that belong to another file into this file, so that the mode of their shape
-    keys can be switched. Returns whether a mesh was copied."""
+    keys can be switched.
+
+    Args:
+        rig: deforming armature of the character.
+
+    Returns:
+        Whether at least one mesh was copied.
+    """
     owned = {}
     locked = [item for item in parts.meshes_of(rig) if is_locked(item)]
     for item in locked:

@@ -195,7 +195,7 @@ def _is_dead(rig: ArmatureObject) -> bool:
     used = bpy.data.user_map(subset=held)
     owners = {u.as_pointer(): u for users in used.values() for u in users}
     strangers = [u for p, u in owners.items() if p not in ours]
-    # Datablocks of these types may use parts of a dead character. Scenes are among them, because
-    # characters with a part in a collection of a scene were excluded above.
+    # Other datablocks of these types may use parts of a dead character. Scenes are among these
+    # types, because a character with a part in a collection of a scene has returned False already.
     lesser = (bpy.types.Material, bpy.types.Key, bpy.types.Scene)
     return all(isinstance(u, lesser) for u in strangers)

@@ -91,7 +91,10 @@ class RISORIUS_OT_describe(FaceOperator, Operator):
 
 
 def self_test_rows() -> tuple[list[tuple[str, bool, str]], str]:
-    """Run the self-test of the wheel. Returns (name, passed, details) of each check, and a report.
+    """Run the self-test of the wheel.
+
+    Returns:
+        (name, whether it passed, details) of each check; the text of the report.
 
     Raises:
         UnusableError: the native module is missing or of another version.

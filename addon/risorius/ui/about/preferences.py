@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender reads the properties of a class from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
 """The preferences of the add-on, with a self-test."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender reads the properties of a class from annotations, which a type checker takes for types:
 # pyright: reportInvalidTypeForm=false
 """Operators that import animation from files and from other rigs."""
 
@@ -242,7 +242,11 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     def _read(
         self, context: Context, live: runtime.Runtime
     ) -> tuple["native.Clip", list[str], str]:
-        """Read the file. Returns: clip of raw controls, lines for the report, mapping's name."""
+        """Read the chosen file.
+
+        Returns:
+            The clip of raw controls, lines for the report, and the name of the mapping.
+        """
         if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
             return native.module().Clip.load(self.filepath), [], ""
         mapping = None if self.mapping == "AUTO" else self.mapping

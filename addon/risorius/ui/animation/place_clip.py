@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Places a clip on the active face as an action, strip or layer, and stores its report."""
 
@@ -65,7 +66,7 @@ class PlacesClip(FaceOperator):
     )
 
     def start_with(self, scene: bpy.types.Scene) -> None:
-        """Set the start frame to the start of the scene, unless a caller has set it."""
+        """Set `start` to the first frame of the scene, unless a caller has already set `start`."""
         if not self.properties.is_property_set("start"):
             self.start = float(scene.frame_start)
 
@@ -85,11 +86,12 @@ class PlacesClip(FaceOperator):
             context: context with the face and the scene.
             clip: the clip.
             name: name of the action.
-            notes: first lines of the report.
-            with_eyes: True: the eye bones rotate too.
+            notes: sentences with which the report begins.
+            with_eyes: True: the clip also rotates the eye bones.
             whole: True: keys are on whole frames only.
-            tolerance: largest difference of a slider from the clip after Bezier keys were fitted;
-                0: a linear key for each sample.
+            tolerance: largest difference between a slider's value in the clip and on the Bezier
+                curve that is fitted to the clip; 0: no curve is fitted, and each sample of the
+                clip becomes a linear key.
 
         Returns:
             The new action.
@@ -126,7 +128,13 @@ class PlacesClip(FaceOperator):
         return made.action
 
     def _others(self, rig: ArmatureObject) -> list[str]:
-        """Set to rest all controls that the animation does not move, or report their number."""
+        """Set to rest all controls that the animation does not move, if `use_rest` is on.
+
+        Returns:
+            One sentence for the report: the number of controls that were set to rest, or with
+            `use_rest` off the names of the controls that keep their values. Empty if all these
+            controls were at rest.
+        """
         found = standing.beside(rig)
         sentence = found.sentence
         if sentence is None:
@@ -138,7 +146,7 @@ class PlacesClip(FaceOperator):
         return [say("{count} controls were brought to rest.", count=count)]
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """Settings of the layer that plays the clip; empty unless a subclass overrides this.
+        """Properties of the layer that plays the clip, by name; subclasses override the empty dict.
 
         Args:
             context: context with the scene, which has the frame rate.

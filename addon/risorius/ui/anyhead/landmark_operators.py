@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that find, place, show, save, load and remove the landmarks of a head."""
 
@@ -52,7 +53,7 @@ def head_there(context: Context) -> MeshObject:
 
 
 def listed(missing: list[str]) -> str:
-    """Names of landmarks as a list in words for a sentence, in the user's language."""
+    """The labels of the landmarks `missing` in the user's language, joined by commas."""
     return names.listed([words.say(finding.words()[name]) for name in missing])
 
 
@@ -80,7 +81,7 @@ class RISORIUS_OT_find_landmarks(RunsBeside, OfHead, Operator):
         return self.begin(context, task)
 
     def finish(self, context: Context) -> Result:
-        """Show the landmarks, and report missing ones by name."""
+        """Show the found landmarks and name the missing ones, or report the error of the search."""
         found, error = self._task.result, self._task.error
         if error is not None and not isinstance(error, native.user_errors()):
             raise error
@@ -206,7 +207,10 @@ class RISORIUS_OT_place_landmark(OfHead, Operator):
 
 
 def _under(context: Context, event: bpy.types.Event, head: MeshObject) -> Vector | None:
-    """The point of the head under the pointer, in the coordinates of its object, or None."""
+    """The point of the head's surface under the mouse pointer, in the object space of the head.
+
+    Returns None if the pointer is not over the head in a 3D view.
+    """
     for area in context.screen.areas if context.screen else ():
         if area.type != "VIEW_3D":
             continue

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender takes properties where Python has annotations:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The operators Make Rig from Head and Conform Face to Head."""
 
@@ -77,7 +78,7 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
         return self.begin(context, task)
 
     def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
-        """The task that makes the face."""
+        """Create the task that makes the face from `head`; the caller starts the task."""
         raise NotImplementedError
 
     def _show(self, context: Context) -> Result:
@@ -96,8 +97,8 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
         return self._show(context)
 
     def _said(self, error: Exception) -> str:
-        """The message of an error. File errors get the name of the file; errors of the package
-        already name the head or the template."""
+        """The sentence that reports an error. The name of the file is added to an OSError; the
+        messages of other errors already name the head or the template."""
         if isinstance(error, OSError):
             return explain(error.filename or self.filepath, error)
         return words.of_error(error)
@@ -162,7 +163,8 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         """The face whose expressions the new rig gets.
 
         Raises:
-            FaceError: no file was chosen, or there is no such face.
+            FaceError: no DNA file was chosen, the scene has no face to choose, or the package has
+                no sample face.
         """
         if self.template == "FACE":
             rig = heads.face_there(context)
@@ -253,7 +255,10 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
 
 
 def _source(rig: ArmatureObject) -> str:
-    """The path from which a face was imported; the file may be gone; "" if unknown."""
+    """The path of the DNA file from which a face was imported, or "" if the face has no path.
+
+    The file may have been deleted or moved since.
+    """
     return bpy.path.abspath(saved.text(rig, parts.SOURCE))
 
 

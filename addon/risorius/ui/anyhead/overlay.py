@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws the landmarks of the selected head as dots over 3D views, with names of selected ones."""
+"""Draws landmarks of the selected head as dots over 3D views, and the names of selected dots."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Dot(NamedTuple):
     """A drawn landmark.
 
     Attributes:
-        mark: its place in world space, its colour, and its radius in pixels.
-        label: its name in the user's language; "" if the landmark is not selected, or if Blender
-            draws the name.
+        mark: the landmark's place in world space, its colour, and its radius in pixels.
+        label: the landmark's name in the user's language; "" if the landmark is not selected, or
+            if Blender draws the name because the object's setting Name is on.
     """
 
     mark: Mark

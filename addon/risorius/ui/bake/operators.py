@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that bake faces to plain actions, and that remove these actions again."""
 
@@ -85,7 +86,8 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
         layout.prop(self, "every")
 
     def execute(self, context: Context) -> Result:
-        # The redo panel runs the same operator object again; it must wait for the result.
+        # The redo panel runs the same operator object again, and must wait until baking has ended.
+        # So the flag is cleared.
         interactive, self._interactive = self._interactive, False
         start, end = self.frames(context)
         options = bake_face.BakeOptions(

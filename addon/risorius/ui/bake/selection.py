@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Chooses the faces, frames and level of detail of a bake or an export."""
 
@@ -101,7 +102,7 @@ class FrameRange(OperatorBase):
         return scene.frame_start, scene.frame_end
 
     def draw_lod(self, layout: UILayout) -> None:
-        """Draw the level of detail; -1 stands for the viewport's level."""
+        """Draw the property `lod`; its value -1 means the level that the viewport shows."""
         words.prop_or(layout, self, "lod", -1, "-1: as in the viewport")
 
     def draw_range(self, layout: UILayout) -> None:

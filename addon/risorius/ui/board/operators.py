@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators of the face board."""
 
@@ -46,9 +47,9 @@ def _regions(_self: object, _context: object) -> list[tuple[str, str, str]]:
 
 
 class _Leading(FaceOperator):
-    """Base of operators that may switch between sliders and board.
+    """Base of operators that may switch between moving the face by sliders and by the board.
 
-    They need a face without an active tweak.
+    The operators are not available while a tweak of the face is active.
     """
 
     @classmethod
@@ -111,7 +112,12 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
     def description(
         cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
     ) -> str:
-        """The tooltip. Args: context  context of the button; properties  the button's settings."""
+        """The tooltip of a button: the description of the kind of board that it adds, or "".
+
+        Args:
+            context: context of the button.
+            properties: the operator's properties that the button sets.
+        """
         tips = {kind: tip for kind, _name, tip in KINDS}
         text = tips.get(getattr(properties, "kind", ""), "")
         return bpy.app.translations.pgettext_tip(text) or text

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws points, pins, moving skin and slider names over the 3D views during a drag.
 
-The draw handlers exist only while an operator uses them; `stop` removes them.
+Blender's draw handlers exist only while an operator uses them; `stop` removes the handlers.
 """
 
 from dataclasses import dataclass, field
@@ -42,9 +42,9 @@ class Shown:
     Attributes:
         points: places in world space, each with a colour and a radius in pixels at interface scale
             1.
-        lines: lines of text beside the first point.
-        places: float64[V, 3], vertices of the coloured mesh, or None.
-        far: float64[V], distance that each vertex moves.
+        lines: lines of text that are drawn beside the first point of `points`.
+        places: float64[V, 3], vertices of the coloured mesh in world space; None: no mesh is drawn.
+        far: float64[V], distance in world space that the drag moves each vertex.
         triangles: int32[T, 3], triangles of the coloured mesh.
     """
 
@@ -61,10 +61,10 @@ _users: set[str] = session.keep("drawing.users", set, ("unregister",))
 
 
 def start(user: str) -> None:
-    """Start drawing for an operator.
+    """Add the draw handlers for an operator, unless another operator has added them.
 
     Args:
-        user: name of the operator, with which it later calls `end`.
+        user: name of the operator; the operator passes the same name to `end`.
     """
     _users.add(user)
     if not _handles:
@@ -74,11 +74,11 @@ def start(user: str) -> None:
 
 
 def show(context: Context, shown: Shown) -> None:
-    """Set the drawing, and redraw all 3D views.
+    """Replace the drawn marks, text and mesh, and redraw all 3D views.
 
     Args:
         context: context with the window manager.
-        shown: the new drawing.
+        shown: the new marks, text and mesh.
     """
     _shown.now = shown
     tag(context)
@@ -97,11 +97,11 @@ def tag(context: Context) -> None:
 
 
 def end(context: Context, user: str) -> None:
-    """Clear the drawing; remove the draw handlers after the last operator.
+    """Draw nothing more; remove the draw handlers if no other operator uses them.
 
     Args:
         context: context with the window manager.
-        user: name of the operator that stops.
+        user: name that the operator passed to `start`.
     """
     _users.discard(user)
     if not _users:
@@ -122,10 +122,10 @@ def is_drawing() -> bool:
 
 
 def colours_of(far: Float) -> Float32:
-    """The colours of vertices, float32[V, 4]; the vertex that moves farthest is the most opaque.
+    """RGBA colours of vertices, float32[V, 4]; the vertex that moves farthest is the most opaque.
 
     Args:
-        far: float64[V], distance that each vertex moves.
+        far: float64[V], distance that the drag moves each vertex.
     """
     most = float(far.max(initial=0.0))
     share = np.clip(far / most, 0.0, 1.0) if most > 0 else np.zeros(len(far))
@@ -137,7 +137,7 @@ def colours_of(far: Float) -> Float32:
 
 
 def _view() -> bpy.types.RegionView3D | None:
-    """The 3D view of the region that is drawn, or None."""
+    """The 3D view of the region that Blender draws at present; None if it shows no 3D view."""
     return cast("bpy.types.RegionView3D | None", cast(Context, bpy.context).region_data)
 
 

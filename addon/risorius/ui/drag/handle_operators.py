@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that pin points of the skin, and that select, hide and key handles on it."""
 
@@ -60,8 +61,9 @@ class RISORIUS_OT_pin(_PointOperator, Operator):
     bl_label = "Pin"
 
     def fits(self, hit: picking.Hit) -> bool:
-        # The same kind of click selects a handle. If Blender tries this operator first, a handle is
-        # refused here, so that the select operator gets the click.
+        # Shift-click on the skin pins a point, and Shift-click on a handle selects the handle. If
+        # Blender tries this operator first, it refuses a handle, so that the operator that
+        # selects handles gets the click.
         return not hit.is_handle
 
     def execute(self, context: Context) -> Result:

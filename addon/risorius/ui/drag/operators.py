@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The operator that drags a point of the skin, from the press to the release."""
 
@@ -180,10 +181,10 @@ class RISORIUS_OT_drag(Operator):
         return {"FINISHED"}
 
     def _click(self, context: Context) -> None:
-        """Select after a press without motion.
+        """Select a handle or a bone after a press without motion of the mouse.
 
-        A pressed handle is selected. Beside the handles, all handles are deselected, and in pose
-        mode the bone under the cursor is selected.
+        A press on a handle selects it. A press on any other point of the skin deselects all
+        handles, and in pose mode selects the bone under the cursor.
         """
         point = {"mesh": self.mesh, "vertex": self.vertex if self._is_handle else -1}
         if self._is_handle or _selected(context, self._held.rig):
@@ -233,7 +234,7 @@ class RISORIUS_OT_drag(Operator):
 
 
 def can_drag(cls: type[Operator]) -> bool:
-    """Poll: whether the file has a face; if not, set the poll message. Args: cls  operator."""
+    """Poll: whether the .blend file has a face; if not, set the poll message of `cls`."""
     if not usable(cls):
         return False
     if not parts.rigs():
@@ -258,7 +259,8 @@ def _triangles(rig: ArmatureObject, mesh: int) -> NDArray[np.int32] | None:
         mesh: index of the mesh in the DNA file.
 
     Returns:
-        None if the mesh is not built, or if its number of vertices differs from the DNA file.
+        None if Blender has no object for this mesh, or if the object's number of vertices differs
+        from the number in the DNA file.
     """
     item = next((i for i in parts.meshes_of(rig) if i[parts.MESH] == mesh), None)
     live = runtime.of(rig)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Settings of the drag tool; they belong to the window manager and are not saved."""
 
@@ -36,7 +37,7 @@ METHODS = (
 
 
 def symmetric_property() -> object:
-    """The property Symmetric, for the settings and for each drag operator."""
+    """Define the property Symmetric, for the tool's settings and for the drag operator."""
     return bpy.props.BoolProperty(
         name="Symmetric",
         description="Mirror the drag on the other side of the face",

@@ -43,9 +43,10 @@ _KEYS = (
     ("risorius.drag_hover", {"type": "MOUSEMOVE", "value": "ANY"}, None),
 )
 
-# "<workspace> <mode>" -> name of the tool that was active before the drag tool.
+# "<workspace> <mode>" -> idname of the tool that was active there before the drag tool.
 _before: dict[str, str] = session.table("tool.before", ("unregister",))
-# Session uid of a face, and its (mesh, vertex) under the cursor; at most one entry.
+# Session uid of the face's armature, and the (mesh, vertex) of the face under the cursor; at most
+# one entry.
 _pointed: list[tuple[int, tuple[int, int]]] = session.keep("tool.pointed", list, ("load",))
 _handles: list[object] = session.keep("tool.handles", list, ("unregister",))
 
@@ -135,14 +136,18 @@ def is_active(context: Context) -> bool:
 
 
 def _active(context: Context) -> str:
-    """The name of the active tool of 3D views in the current mode; "" if there is none."""
+    """The idname of the active tool of 3D views in the current mode; "" if no tool is active."""
     tools = context.workspace.tools
     tool = tools.from_space_view3d_mode(context.mode, create=False)  # pyright: ignore  the stub's
     return tool.idname if tool is not None else ""
 
 
 def _draw() -> None:
-    """Draw points over each 3D view while the tool is active and no drag runs."""
+    """Draw the handles and pins of the active face, and the point under the cursor.
+
+    Blender calls this function for each 3D view. Nothing is drawn while the tool is inactive or
+    a drag runs.
+    """
     context = cast(Context, bpy.context)
     space = context.space_data
     if drawing.is_drawing() or not is_active(context):

@@ -16,7 +16,10 @@ Float = NDArray[np.float64]
 
 @dataclass
 class View:
-    """A region of a 3D view or of a quad view; valid within one operator."""
+    """A region of a 3D view or one of the four regions of a quad view.
+
+    An object is valid only while one operator runs, because Blender may delete the region later.
+    """
 
     area: bpy.types.Area
     region: bpy.types.Region
@@ -27,21 +30,29 @@ class View:
         return Vector((event.mouse_x - self.region.x, event.mouse_y - self.region.y))
 
     def ray(self, at: Vector) -> tuple[Vector, Vector]:
-        """Origin and unit direction of the ray through a pixel. Args: at  the pixel."""
+        """Origin and unit direction in world space of the ray from the viewer through a pixel.
+
+        Args:
+            at: the pixel, from the region's lower left corner.
+        """
         pixel = (at.x, at.y)
         direction = view3d_utils.region_2d_to_vector_3d(self.region, self.data, pixel)
         return view3d_utils.region_2d_to_origin_3d(self.region, self.data, pixel), direction
 
     def pixel(self, place: Float) -> Vector | None:
-        """The pixel of a place, or None behind the viewer. Args: place  float64[3] in the world."""
+        """The pixel at which a place is seen; None if the place is behind the viewer.
+
+        Args:
+            place: float64[3] in world space.
+        """
         return view3d_utils.location_3d_to_region_2d(self.region, self.data, Vector(place.tolist()))
 
     def target(self, at: Vector, depth: Float) -> Float:
         """The place in world space under a pixel, float64[3].
 
         Args:
-            at: the pixel.
-            depth: float64[3], a place with the wanted distance from the viewer.
+            at: the pixel, from the region's lower left corner.
+            depth: float64[3], a place in world space at the wanted distance from the viewer.
         """
         near = Vector(depth.tolist())
         return np.array(view3d_utils.region_2d_to_location_3d(self.region, self.data, at, near))

@@ -50,14 +50,16 @@ def _gltf(operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
         "use_active_scene": True,
         "export_animations": True,
         "export_animation_mode": "ACTIVE_ACTIONS",
-        # If True, every action of the file with matching bone names would be exported.
+        # If this setting were True, every action of the .blend file with matching bone names would
+        # be exported.
         "export_anim_single_armature": False,
         "export_nla_strips_merged_animation_name": stage.objects[0].name,
         "export_frame_range": True,
         "export_frame_step": whole_step(operator),
         "export_force_sampling": True,
         "export_optimize_animation_size": False,
-        # If True, Blender 4.5 writes wrong bones if two armatures are exported together.
+        # If this setting were True, Blender 4.5 would write wrong bones if two armatures are
+        # exported together.
         "export_optimize_disable_viewport": False,
         "export_skins": True,
         "export_all_influences": operator.influences == 0,
@@ -117,13 +119,13 @@ def _alembic(_operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
     }
 
 
-# Functions that return the exporter's settings for a format. Settings that the exporter of this
-# Blender lacks are left out.
+# Format -> function that returns the settings of Blender's exporter for this format. `export`
+# leaves out settings that the exporter of the running Blender version lacks.
 _SETTINGS = {"GLTF": _gltf, "FBX": _fbx, "USD": _usd, "ALEMBIC": _alembic}
 
 
 def whole_step(operator: ExportOperator) -> int:
-    """The step between exported frames, a whole number, because exporters accept no fractions."""
+    """The step between exported frames, rounded because exporters accept only whole numbers."""
     return max(1, round(operator.step))
 
 
@@ -146,7 +148,8 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
 
     Args:
         operator: export operator with the format and settings of the user.
-        override: context for the exporter, from export_animation.copies.
+        override: members of the context that the exporter gets: the scene and objects that
+            `export_animation.copies` has copied for this export.
         path: file to write, in a folder that is used for this export only.
 
     Raises:

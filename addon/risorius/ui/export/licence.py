@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
-"""The form for the licence in a VRM file; at first all fields of the form are unset."""
+"""The form for the licence in a VRM file; all fields are unset until the user sets them."""
 
 from collections.abc import Iterator
 
@@ -72,12 +73,16 @@ class LicenceForm:
     )  # fmt: skip
 
     def draw_licence(self, layout: bpy.types.UILayout) -> None:
-        """Draw the fields of the chosen VRM version. Args: layout  layout of the dialog."""
+        """Draw the licence fields of the chosen VRM version.
+
+        Args:
+            layout: layout of the dialog.
+        """
         for name, _ in self._fields():
             layout.prop(self, name)
 
     def licence(self) -> dict[str, str | bool | list[str]]:
-        """VRM's name of a field -> value; fields that the user left unset are missing."""
+        """VRM's name of a field -> value, without the fields that the user left unset."""
         out: dict[str, str | bool | list[str]] = {}
         for name, field in self._fields():
             value = getattr(self, name)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Exports moving faces with Blender's exporters, or the curves of their controls as a file."""
 
@@ -121,11 +122,14 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
         return ExportHelper.invoke(self, context, event)
 
     def check(self, context: Context) -> bool:
-        """Set the extension of the format while the dialog is open."""
+        """Give the file name in the open dialog the extension of the chosen format.
+
+        Returns whether the file name was changed.
+        """
         if self.format == "USD" and self.filepath.endswith((".usd", ".usda", ".usdz")):
             return False
         path = Path(self.filepath)
-        # The name may contain a dot, such as shot.v02.
+        # A name may contain a dot, such as "shot.v02". Only known extensions are replaced.
         stem = path.stem if path.suffix.lower() in _KNOWN else path.name
         changed = str(path.with_name(stem + _ENDINGS[self.format])) if stem else self.filepath
         if Path(self.filepath).name in ("", ".") or changed == self.filepath:
@@ -233,7 +237,10 @@ def _write_csv(clip: "native.Clip", path: Path) -> None:
 
 
 def _one_sentence(path: str, error: Exception) -> str:
-    """The sentence of an error; for a traceback of an exporter, its last line."""
+    """A sentence with the name of the file and the last useful line of an error's text.
+
+    If the text is a traceback of an exporter, its location lines are skipped.
+    """
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     useful = [x for x in lines if not x.startswith(("Location:", "File ", "Traceback"))]
     text = (useful or ["it failed without a word"])[-1].removeprefix("Error: ").rstrip(".")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that save, change, export and import the user's expressions and draw their pictures."""
 
@@ -88,7 +89,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
 
     @staticmethod
     def _give_pictures(context: Context) -> None:
-        """Set pictures of this face as previews of all pose assets of expressions in this file."""
+        """Set pictures of the active face as previews of the .blend file's expression assets."""
         rig = face_rig(context)
         for action in bpy.data.actions:
             expression = library.of_action(action)
@@ -126,7 +127,11 @@ class _LibraryOperator(FaceOperator):
         return {"FINISHED"}
 
     def work(self, context: Context) -> None:
-        """Do the operator's work. Raises: errors that a user can mend."""
+        """Do the work of the operator.
+
+        Raises:
+            native.user_errors(): any of these errors is reported to the user as one sentence.
+        """
         raise NotImplementedError
 
 
@@ -139,7 +144,8 @@ def _put(
 ) -> None:
     """Make a pose asset of the expression in the open .blend file, with a picture.
 
-    If `shared`, the library stores the expression too, in a new file or instead of the file `over`.
+    If `shared` is True, the expression is also written to the user's library: into the existing
+    file `over`, or into a new file if `over` is None.
     """
     picture = assets.picture_of(rig, expression)
     sitter = None if picture.is_file() else thumbnails.sitter_of(rig)
@@ -212,7 +218,10 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
 
 
 class _OfOne(_LibraryOperator):
-    """Base of operators on the named expression; without a name, on the last clicked one."""
+    """Base of operators on the expression that the property `expression` names.
+
+    If this property is empty, the operator uses the expression that was clicked last.
+    """
 
     expression: bpy.props.StringProperty(name="Expression", options={"SKIP_SAVE"})
 
@@ -311,7 +320,7 @@ class RISORIUS_OT_star_expression(_OfOne, Operator):
 
 
 class _OfFolder(_LibraryOperator, OperatorBase):
-    """Base of operators on a folder; they ask before they replace files of the user."""
+    """Base of operators on a folder; they ask before they replace the user's own expressions."""
 
     directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH")
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})

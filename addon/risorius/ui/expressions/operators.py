@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that apply an expression to the sliders, by a click or by dragging."""
 
@@ -85,13 +86,16 @@ class Applies(Mixes):
     """Base of operators that set an expression by a click, without dragging."""
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        """Set the expression at a click; Ctrl swaps left and right, Shift adds it to the pose.
+        """Set the expression at a click.
+
+        With Ctrl, left and right of the expression are swapped. With Shift, the expression is
+        added to the current pose.
 
         Args:
             context: context of the operator.
             event: event with the held modifier keys.
         """
-        # Ctrl flips poses in Blender's pose library, too.
+        # Ctrl flips a pose in Blender's pose library, so it flips an expression here.
         self.flip, self.additive = self.flip != event.ctrl, self.additive != event.shift
         return self.execute(context)
 
@@ -132,8 +136,8 @@ class Blends(Mixes):
             self.cancel(context)
             return {"CANCELLED"}
         if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}:
-            # Accept the blend: if it began with a click, at the next press of the button; if it
-            # began with a drag, at the release of the button.
+            # This event accepts the blend. If the blend began with a click, the event is the next
+            # press of the mouse button; if it began with a drag, the release of the button.
             context.workspace.status_text_set(None)
             return self.execute(context)
         if event.type == "MOUSEMOVE":
@@ -150,7 +154,7 @@ class Blends(Mixes):
         return {"RUNNING_MODAL"}
 
     def _follow(self, context: Context) -> None:
-        """Show the blend, or the pose before it while Tab has switched the blend off."""
+        """Show the blended pose, or the pose before the blend if Tab has switched the blend off."""
         rig = face_rig(context)
         sides.restore(rig, self._held)
         if self._shown:

@@ -17,8 +17,8 @@ from .menus import RISORIUS_MT_expressions
 from .properties import ALL, STARRED, RISORIUS_PG_expressions, choices, remember_categories
 
 _ICON = 20.0  # pixels of an icon, and of a picture per unit of its size
-# Hashes (thumbnails.look_of) of characters for which this session has started to draw pictures
-# automatically.
+# Hashes of characters (results of thumbnails.look_of) for which the panel has started to draw
+# pictures since Blender was started.
 _asked: set[str] = session.keep("expressions.panel.asked", set, ("unregister",))
 
 
@@ -72,13 +72,18 @@ def _draw_tools(layout: UILayout, chosen: RISORIUS_PG_expressions) -> None:
 
 
 def _chosen(items: list[library.Item], chosen: RISORIUS_PG_expressions) -> list[library.Item]:
-    """The expressions of the chosen category whose names or texts contain all searched words."""
+    """The expressions of the chosen category whose name, label or description has all sought words.
+
+    Args:
+        items: all expressions.
+        chosen: the panel's settings, with the category and the text of the search field.
+    """
     sought, group = chosen.search.lower().split(), chosen.category
     starred = library.favourites() if group == STARRED else set()
     found = []
     for item in items:
         expression = item.expression
-        # Search the short name too, such as PP for M B P.
+        # Search the expression's short name too: for example, "PP" finds the label "M B P".
         named = f"{expression.name} {expression.label} {words.say(expression.label)}"
         text = f"{named} {expression.description}".lower()
         fits = group in (ALL, expression.group) or expression.name in starred
@@ -125,7 +130,7 @@ def _draw_grid(
 
 
 def _draw_one(layout: UILayout, item: library.Item) -> None:
-    """Draw the actions for the last clicked expression."""
+    """Draw the name, description and buttons of the expression that was clicked last."""
     expression, own = item.expression, item.source != library.RISORIUS
     box = layout.box()
     row = box.row(align=True)
@@ -153,7 +158,11 @@ def _draw_own(layout: UILayout, chosen: RISORIUS_PG_expressions) -> None:
 
 
 def _ask_once(look: str) -> None:
-    """Start to draw the pictures of a character once per session, after the panel is drawn."""
+    """Start drawing the pictures of a character after the panel is drawn, once for each character.
+
+    Args:
+        look: hash of the character, from thumbnails.look_of.
+    """
     if look in _asked or bpy.app.background:
         return
     _asked.add(look)
@@ -161,7 +170,10 @@ def _ask_once(look: str) -> None:
 
 
 def _begin() -> None:
-    """Start the operator that draws pictures; called by a timer, because panels must not do it."""
+    """Start the operator that draws pictures.
+
+    A timer calls this, because a panel must not call operators while it is drawn.
+    """
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.render_thumbnails.poll():

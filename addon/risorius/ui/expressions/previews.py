@@ -13,12 +13,12 @@ from ...scene.character import runtime
 from ...scene.expressions import poses, thumbnails
 from ...scene.expressions.library import Item
 
-# Key "icons" -> Blender's preview collection.
+# "icons" -> Blender's preview collection with the loaded pictures; empty until one is loaded.
 _held: dict[str, Any] = session.table("previews.held", ("unregister",))
 
 
 def icon_of(path: Path) -> int:
-    """The number of the icon for a picture, or 0 if the file does not exist."""
+    """The number of Blender's icon for a picture file, or 0 if the file does not exist."""
     icons = _held.setdefault("icons", bpy.utils.previews.new()) if not _held else _held["icons"]
     key = str(path)
     if key not in icons:
@@ -29,10 +29,12 @@ def icon_of(path: Path) -> int:
 
 
 def load(path: Path) -> int:
-    """The number of the icon for a picture, or 0; Blender reads the file at once, for search lists.
+    """The number of Blender's icon for a picture file, or 0 if the file does not exist.
+
+    Blender reads the file at once, because a search list shows no picture that is read later.
 
     Args:
-        path: path of the picture.
+        path: path of the picture file.
     """
     icon = icon_of(path)
     if icon:
@@ -41,13 +43,15 @@ def load(path: Path) -> int:
 
 
 def forget() -> None:
-    """Remove all icons, when the add-on ends and before pictures are drawn again."""
+    """Remove all icons: when the add-on is disabled, and before pictures are drawn again."""
     if _held:
         bpy.utils.previews.remove(_held.pop("icons"))
 
 
 def jobs_of(rig: ArmatureObject, items: list[Item]) -> list[thumbnails.Job]:
-    """The pictures to draw for expressions on a character, in the same order.
+    """One job for each expression: the picture file and the slider values that it shows.
+
+    The jobs are in the order of `items`, also for expressions whose picture exists already.
 
     Args:
         rig: deforming armature of the character.

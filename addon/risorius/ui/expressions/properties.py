@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Settings of the grid of expressions and of clicks on it; they belong to the window manager."""
 
@@ -13,8 +14,8 @@ from ..blender_types import Context, Item
 from ..words import say
 
 ALL, STARRED = "ALL", "STARRED"
-# "regions" or "categories" -> items of a dynamic enum property. The items are kept alive here,
-# because Blender keeps no references to their strings.
+# "regions" or "categories" -> items of the enum property that Blender asks for. The items are kept
+# here, because Blender keeps no references to the strings of the items.
 _known: dict[str, list[Item]] = session.table("expressions.properties.known", ("unregister",))
 
 
@@ -33,7 +34,8 @@ def remember_categories(groups: list[str]) -> None:
     """Set the categories that the panel offers.
 
     Args:
-        groups: groups of the existing expressions, in their order.
+        groups: names of the groups of all existing expressions, in the order of the menu; each
+            group becomes a category.
     """
     named = {"emotion": say("Emotions"), "face": say("Faces"), "viseme": say("Visemes")}
     items = [(ALL, say("All"), say("All expressions"))]

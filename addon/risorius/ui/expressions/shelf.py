@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """An asset shelf with expressions, for versions of Blender whose shelves accept operators.
 
@@ -39,7 +40,11 @@ class _OfAsset(OperatorBase):
     )
 
     def item(self, context: Context) -> library.Item:
-        """The expression of the asset. Raises: LibraryError: the asset has no expression."""
+        """The expression that is stored in the asset.
+
+        Raises:
+            LibraryError: no expression is stored in the asset.
+        """
         name = self.relative_asset_identifier.replace("\\", "/").rpartition("/")[2]
         asset: Any = getattr(context, "asset", None)
         text = asset.metadata.get(library.MARK) if asset is not None else None
@@ -90,7 +95,7 @@ class RISORIUS_AST_expressions(bpy.types.AssetShelf):
 
 
 def takes_operators() -> bool:
-    """Whether asset shelves of this Blender accept the add-on's operators: since 4.3."""
+    """Whether asset shelves of this Blender can run the add-on's operators, as from 4.3 on."""
     return "bl_activate_operator" in bpy.types.AssetShelf.bl_rna.properties
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first line of the tab: the name of the face, or the active mode with a button that ends it.
 
-It is always one line high, so that the panels below stay in place.
+The banner is always one line high, so that the panels below it do not move.
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,14 +25,14 @@ _TEXT = 0.72  # share of the line for the text; the rest is for the button
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode of a face in which edits have another effect.
+    """A mode of a face that changes the effect of edits or the view, and that the user can end.
 
     Attributes:
         text: name of the mode, in the user's language.
         icon: icon before the text.
         operator: operator that ends the mode.
         settings: properties of the operator.
-        alert: True: draw as a warning, because the view or the keys of the face are not as usual.
+        alert: True: the banner is red, as a warning that the view or new keys are not as usual.
     """
 
     text: str
@@ -53,7 +53,7 @@ def modes(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> li
 
 
 def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
-    """Modes that change the effect of edits and keyframes: capture, bake, tweak and board."""
+    """Active modes that change the effect of edits and keys: capture, bake, tweak and board."""
     session = sessions.of(controls)
     if session is not None and session.recording is not None:
         yield Mode(words.say("Recording"), "REC", "risorius.live_record", alert=True)
@@ -73,7 +73,7 @@ def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) ->
 
 
 def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
-    """Modes that change the view of the face, or link its left and right sliders."""
+    """Active modes that change the view of the face, or link its left and right sliders."""
     look = look_masks.of(rig)
     if look.solo:
         swapped = as_seen(context)
@@ -92,7 +92,7 @@ def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -
 
 
 def draw(layout: UILayout, context: Context, rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Draw the name of the face, or the first of its active modes with the button Done.
+    """Draw the name of the face, or the first active mode of the face with the button Done.
 
     Args:
         layout: layout of the panel.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Tests one blend shape by hand: a search, a weight and a button that ends the test."""
 
@@ -15,12 +16,20 @@ from ..blender_types import Context, Item, Operator, Panel, Result
 from ..common import FaceOnlyPanel, FaceOperator, face_rig
 from ..words import CONTEXT, NAMES, say
 
-# Blender reads the strings of enum items later, so they must stay alive.
+# Items of the enum `channel`. Blender reads their strings after `_channels` has returned, so the
+# items are kept here.
 _items: list[Item] = session.keep("channel_preview.items", list, ("unregister",))
 
 
 def _test(context: Context, rig: ArmatureObject, channel: int, value: float | None) -> None:
-    """Show a channel of a face with a test weight, or end the test if `value` is None."""
+    """Show a blend shape channel of a face with a test weight, or end the test.
+
+    Args:
+        context: context of Blender.
+        rig: deforming armature of the face.
+        channel: index of the channel in the DNA file.
+        value: weight of the channel; None: end the test.
+    """
     if value is None:
         channel_preview.clear(rig)
     else:
@@ -29,7 +38,7 @@ def _test(context: Context, rig: ArmatureObject, channel: int, value: float | No
 
 
 def _channels(_operator: object, context: bpy.types.Context | None) -> list[Item]:
-    """Enum items: the channels that move a mesh of the active face."""
+    """Enum items for the blend shape channels that move at least one mesh of the active face."""
     rig = parts.active_rig(cast(Context, context)) if context is not None else None
     live = runtime.of(rig) if rig is not None else None
     _items.clear()
@@ -106,7 +115,10 @@ def _set_weight(_manager: bpy.types.WindowManager, value: float) -> None:
 
 
 def weight_property() -> object:
-    """The slider that shows and sets the test weight of the active face; it stores nothing."""
+    """Define the slider that shows and sets the test weight of the active face.
+
+    The property itself stores no value.
+    """
     return bpy.props.FloatProperty(
         name="Weight",
         translation_context=CONTEXT,

@@ -70,7 +70,7 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
             words.write(layout, nothing, "INFO")
 
 
-# Panels are redrawn with every played frame, so the grouping is cached.
+# The panel is redrawn at every frame of a playback, so the groups of sliders are cached.
 @session.cached(("unregister",), 8)
 def _regions(shown: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
     groups = slider_words.group_controls(shown, native.regions())
@@ -120,15 +120,15 @@ def _draw_region_header(layout: UILayout, region: str) -> None:
 
 
 class _Part(NamedTuple):
-    """The sliders of a region and their context.
+    """The sliders of a region, with the data for drawing them.
 
     Attributes:
         context: context of the panel.
-        face: the bone with the sliders.
+        face: the bone whose custom properties are the sliders.
         region: region of the sliders.
         names: names of the sliders.
-        followers: following slider -> leading slider.
-        given: slider -> value from the face board.
+        followers: of two linked sides, the slider that follows -> the slider that leads.
+        given: slider that a handle of the face board moves -> its value.
     """
 
     context: Context
@@ -153,18 +153,18 @@ def draw_sliders(
 ) -> None:
     """Draw one line for each control; left and right share a line.
 
-    A name that is too long for the line is drawn above it. Of two linked sides only the leading
-    slider is drawn. Values from the face board are drawn as read-only bars, because their sliders
-    have no effect.
+    A name that is too long for its line is drawn above the line. Of two linked sides only the
+    leading slider is drawn. A slider that the face board moves is drawn as a read-only bar, because
+    changing the slider has no effect.
 
     Args:
         context: context of the panel.
         layout: layout of the panel.
-        face: the bone with the sliders.
+        face: the bone whose custom properties are the sliders.
         region: region of the sliders.
         names: names of the sliders.
-        followers: following slider -> leading slider.
-        given: slider -> value from the face board.
+        followers: of two linked sides, the slider that follows -> the slider that leads.
+        given: slider that a handle of the face board moves -> its value.
     """
     part = _Part(context, face, region, names, followers, given)
     first, more = part.lines()
@@ -172,9 +172,9 @@ def draw_sliders(
 
 
 def _draw_parted(layout: UILayout, part: _Part, rests: Mapping[str, float]) -> None:
-    """Draw the most used sliders, and the heading More with the others.
+    """Draw the most used sliders of a region, and the heading More with the other sliders.
 
-    The heading shows how many of its sliders are not at rest.
+    The heading shows how many of the sliders below it are not at rest.
     """
     first, more = part.lines()
     _draw_lines(layout, part, first)
@@ -217,9 +217,13 @@ def _draw_lines(layout: UILayout, part: _Part, lines: Sequence[slider_rows.Row])
 
 
 def _draw_sides(column: UILayout, linked: bool) -> None:
-    """Draw headings of the columns Left and Right, or one heading Both Sides if they are linked.
+    """Draw headings of the columns Left and Right, or one heading Both Sides.
 
-    The headings replace the letters L and R, for which a slider has no room before its number.
+    The headings replace letters L and R in each slider, which has no room for a letter.
+
+    Args:
+        column: layout of the sliders.
+        linked: True: the sides of the face are linked, so one slider moves both.
     """
     row = column.split(factor=_TITLE, align=True)
     row.label(text="")

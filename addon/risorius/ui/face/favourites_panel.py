@@ -35,7 +35,8 @@ def draw_button_menu(self: Menu, context: Context) -> None:
     """Add entries to a slider's context menu.
 
     Args:
-        self: the context menu of any button; without a slider under the mouse it stays unchanged.
+        self: the context menu of any button; the menu stays unchanged unless the mouse is over a
+            slider of the face.
         context: context of the menu.
     """
     name = control_under_mouse(context) if active_controls(context) is not None else ""

@@ -65,9 +65,9 @@ class RISORIUS_PT_character(FacePanel, Panel):
 
 
 def _draw_start(layout: UILayout) -> None:
-    """Draw the first steps.
+    """Draw the steps from getting a face to animating it, while no face is active.
 
-    Buttons of later steps are grey, and their tooltips name the missing step.
+    Buttons of later steps are grey, and their tooltips name the step that must be done before.
     """
     if any(parts.rigs()):
         words.write(layout, "No face is selected: click on one.", "INFO")
@@ -111,7 +111,8 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
         ("VIEWPORT", "Detail in the Viewport", lods.viewport_level(rig)),
         ("RENDER", "Detail in Renders", lods.render_level(rig)),
     ):
-        # The label has a separate line, because eight buttons leave no room for it.
+        # The label has its own line above the buttons, because up to eight buttons, one for each
+        # level, leave no room for the label.
         column.label(text=text, text_ctxt=words.CONTEXT)
         row = column.row(align=True)
         row.active = not auto

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Makes Blender's Paste Pose Flipped swap the sliders of a face too.
 
@@ -27,13 +28,13 @@ from ..words import say
 _MARK = 0.3215  # a marker value that no user sets
 _BLENDERS = "POSE_OT_paste"
 _keys: list[Any] = session.keep("paste_flipped.keys", list, ("unregister",))
-# "last" -> (pointer, bl_idname) of the last operator that was checked; "selected" -> setting
-# Selected Only of the last flipped paste.
+# "last" -> (pointer, bl_idname) of the operator that `pasted_by_blender` has checked last;
+# "selected" -> the setting On Selected Only of Blender's last flipped paste.
 _seen: dict[str, object] = session.table("paste_flipped.seen", ("unregister",))
 
 
 def _posed_controls(context: Context) -> ArmatureObject | None:
-    """The control armature of the active face, if it is in pose mode."""
+    """The control armature of the active face; None if this armature is not in pose mode."""
     controls = active_controls(context)
     return controls if controls is not None and context.pose_object == controls else None
 
@@ -66,7 +67,8 @@ class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
         if led:
             board.mark(rig, _MARK)
         tools = context.scene.tool_settings
-        # Blender would insert keyframes when it pastes the sliders, before they are swapped.
+        # With auto keying, Blender would insert keyframes when it pastes the sliders, before this
+        # operator swaps left and right sliders.
         auto, tools.use_keyframe_insert_auto = tools.use_keyframe_insert_auto, False
         try:
             bpy.ops.pose.paste(flipped=True, selected_mask=self.selected)
@@ -90,7 +92,7 @@ def _is_mark(value: float) -> bool:
 
 
 def _draw(self: Menu, context: Context) -> None:
-    """Add our entries to the menu Pose."""
+    """Add this add-on's entries to Blender's menu Pose."""
     if _posed_controls(context) is not None:
         self.layout.separator()
         self.layout.operator("risorius.copy_pose", icon="COPYDOWN")
@@ -100,7 +102,7 @@ def _draw(self: Menu, context: Context) -> None:
 
 
 def pasted_by_blender(manager: bpy.types.WindowManager) -> bool:
-    """Whether Blender's operator has just pasted a pose flipped; True only once for each paste."""
+    """Whether Blender's last operator has pasted a pose flipped; True only once for each paste."""
     last = manager.operators[-1] if len(manager.operators) else None
     kind = last.bl_idname if last is not None else ""
     state = (last.as_pointer() if last is not None else 0, kind)
@@ -121,7 +123,7 @@ def _updated(_scene: bpy.types.Scene, _depsgraph: object) -> None:
 
 
 def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
-    """The window whose active object is a face's controls in pose mode, or None."""
+    """The window whose active object is the control armature of a face in pose mode, or None."""
     for window in manager.windows:
         active = window.view_layer.objects.active
         rig = parts.rig_of(active)
@@ -133,7 +135,10 @@ def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
 
 
 def _once_more() -> None:
-    """Undo Blender's paste and run our operator, so that one undo step reverts the paste."""
+    """Undo Blender's paste and run this add-on's paste operator instead.
+
+    Thus the user needs one undo step to revert the paste, not two.
+    """
     context = current_context()
     window = _posing_window(context.window_manager)
     if window is None:

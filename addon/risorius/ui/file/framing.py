@@ -114,7 +114,10 @@ def show_with_board(context: Context, rig: ArmatureObject) -> None:
 
 
 def _largest_or_own(context: Context) -> bpy.types.Area | None:
-    """The 3D view of the context, or the window's largest 3D view that shows no camera."""
+    """The 3D view of the context, or else the window's largest 3D view without a camera view.
+
+    Returns None if the window has no such view.
+    """
     screen = context.window.screen if context.window is not None else None
     areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
     if context.area in areas:
@@ -125,11 +128,11 @@ def _largest_or_own(context: Context) -> bpy.types.Area | None:
 
 
 def _free_part(area: bpy.types.Area, region: bpy.types.Region) -> view_fit.Box:
-    """The rectangle of a region that no other region of its area covers.
+    """The rectangle of `region` that no other region of its area covers.
 
-    Sidebar, toolbar and headers cover a part if the preferences let regions overlap. If they leave
-    nothing free, the whole region is returned. The rectangle is in pixels from the lower left
-    corner of `region`.
+    Sidebar, toolbar and headers cover a part of `region` if the preferences let regions overlap. If
+    they cover `region` completely, the result is the whole region. The rectangle is (left, bottom,
+    right, top) in pixels from the lower left corner of `region`.
     """
     left, bottom, right, top = 0, 0, region.width, region.height
     for other in area.regions:
@@ -187,13 +190,13 @@ def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Q
 
 
 def _corners(rig: ArmatureObject) -> NDArray[np.float64]:
-    """The corners of the head's bounding boxes in world space, float64[N, 3]."""
+    """Corners of the bounding boxes of the head's meshes in world space, float64[N, 3]."""
     boxes = [(item.matrix_world, item.bound_box) for item in lods.heads(rig)]
     return np.array([matrix @ Vector(c) for matrix, box in boxes for c in box], np.float64)
 
 
 def _ball(rig: ArmatureObject) -> tuple[list[float], float]:
-    """Centre and radius of a ball around the head's bounding boxes, in world space."""
+    """Centre and radius of a ball around bounding boxes of the head's meshes, in world space."""
     corners = _corners(rig)
     low, high = corners.min(axis=0), corners.max(axis=0)
     return ((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2

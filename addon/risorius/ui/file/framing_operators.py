@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that frame the face and hide or move the outlines of its control bones."""
 
@@ -44,8 +45,7 @@ class RISORIUS_OT_frame_face(FaceOperator, Operator):
 
 
 def _only_outlines(context: Context) -> bool:
-    """Whether at least one control bone or armature of the active face is selected, and nothing
-    else."""
+    """Whether only control bones or armatures of the active face are selected, and at least one."""
     rig = face_rig(context)
     controls = parts.controls_of(rig)
     if context.mode == "POSE":
@@ -89,7 +89,10 @@ class RISORIUS_OT_move_outlines(FaceOperator, Operator):
 
 
 def register() -> None:
-    """Bind the key of Frame Selected to our operator, which acts if only outlines are selected."""
+    """Bind the numpad key "." of Blender's Frame Selected to the operator Frame Face.
+
+    The operator frames the face if only outlines are selected; otherwise Blender's operator runs.
+    """
     config = current_context().window_manager.keyconfigs.addon
     if config is None:
         return  # in background mode there is no key configuration

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that import faces from DNA files and add sample faces."""
 
@@ -38,8 +39,9 @@ def import_character(
     options: build.BuildOptions,
     show: bool = False,
 ) -> Result:
-    """Build a character from a DNA file beside the scene's other faces, and report the result with
-    at most five warnings, or the error.
+    """Build a character from a DNA file and place it beside the other faces of the scene.
+
+    The operator reports the result with at most five warnings, or the error.
 
     Args:
         operator: operator that reports.
@@ -49,7 +51,7 @@ def import_character(
         show: True: frame the face in the 3D views of the user's window.
 
     Returns:
-        The return value for `execute`.
+        {"FINISHED"}, or {"CANCELLED"} after an error: the result of the operator's `execute`.
     """
     try:
         with shown_progress(context) as progress:

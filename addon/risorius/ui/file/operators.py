@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that replace, reload and export the DNA file of a face."""
 
@@ -25,7 +26,7 @@ from ..words import local, of_error, say
 
 
 def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> None:
-    """Report the first sentences, and the number of others.
+    """Report the first `shown` sentences, and the number of the sentences that follow them.
 
     Args:
         operator: operator that reports.
@@ -180,8 +181,8 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 def draw_export(self: Menu, _context: Context) -> None:
     """Add the entries for faces to the menu File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
-    # Users also find Blender's own exporters in this menu, but these write a face in its rest pose
-    # unless it is baked.
+    # This menu also contains Blender's own exporters, which write a face in its rest pose unless
+    # the face is baked. So the menu gets entries for the animation of faces, too.
     self.layout.operator(
         "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
     )

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that make a face with joints from a head with shape keys."""
 
@@ -175,8 +176,8 @@ class MadeFace(NamedTuple):
 
     Attributes:
         head: name of the head's mesh object.
-        shapes: meshes and shapes from which the face was made.
-        rig: the joint rig, with its errors.
+        shapes: meshes of the head and their shapes, from which the face was made.
+        rig: the joint rig, with the distances between its vertices and the shapes.
         odd: warnings, one sentence each.
     """
 
@@ -201,10 +202,10 @@ def show_made(
         context: context of Blender.
         path: path of the DNA file.
         made: the face that was made.
-        with_materials: True: build materials for meshes that have none on the head.
+        with_materials: True: build new materials for meshes that have no material on the head.
 
     Returns:
-        The return value for `execute`.
+        {"FINISHED"}, or {"CANCELLED"} after an error: the result of the operator.
     """
     before, materials = set(bpy.data.objects), set(bpy.data.materials)
     options = build.BuildOptions(materials=with_materials)
@@ -233,7 +234,13 @@ def show_made(
 
 
 def _take_place(context: Context, face: MadeFace, before: set[bpy.types.Object]) -> None:
-    """Place the new face beside the head and assign the head's materials."""
+    """Place the new face beside the head and assign the head's materials.
+
+    Args:
+        context: context of Blender.
+        face: the face that was made.
+        before: all objects before the import.
+    """
     head = bpy.data.objects.get(face.head)
     made = next((o for o in set(bpy.data.objects) - before if parts.is_rig(o)), None)
     if head is None or made is None:
@@ -247,7 +254,7 @@ def _take_place(context: Context, face: MadeFace, before: set[bpy.types.Object])
 
 
 def draw_make_rig(self: Menu, _context: Context) -> None:
-    """Draw the entry Make Rig from Shape Keys in the menu Object or of the shape key list."""
+    """Draw the entry Make Rig from Shape Keys in the menu Object or the menu of the key list."""
     self.layout.separator()
     self.layout.operator(RISORIUS_OT_make_rig.bl_idname, icon="ARMATURE_DATA")
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The base class of operators that change controls by hand and insert keyframes."""
 
@@ -41,12 +42,15 @@ class HandOperator(FaceOperator):
         """Move the controls from their current values.
 
         Returns:
-            Names of the changed sliders; None if nothing changed and the reason was reported.
+            Names of the changed sliders; None if no control was moved and the reason was reported.
         """
         raise NotImplementedError
 
     def stand_at(self, frame: float) -> None:
-        """Let a subclass prepare for a frame, before `move` is called for this frame."""
+        """Prepare for a frame; called before `move` is called for this frame.
+
+        The base class does nothing here.
+        """
 
     def execute(self, context: Context) -> Result:
         rig, done = face_rig(context), []

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Favourite sliders, and the operator of the star next to a slider."""
 
@@ -19,7 +20,10 @@ def _preferences(context: Context) -> Any:  # noqa: ANN401  importing the class 
 
 
 def favourites_of(context: Context) -> list[str]:
-    """The favourites of the active face, or the user's if the face has no list of its own."""
+    """The names of the active face's favourite sliders.
+
+    If the face has no list of its own, the list of the add-on's preferences is used.
+    """
     users = getattr(_preferences(context), "favourites", "")
     return favourites.of(face_controls(context), users)
 

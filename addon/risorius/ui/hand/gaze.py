@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The panel Eyes and Head, and its operators: blinks, and the target that the eyes follow."""
 
@@ -27,8 +28,8 @@ TARGETS = (
 def proposed(context: Context) -> str:
     """The name of the most likely target of the eyes; "" if there is none.
 
-    It is the active or another selected object that is no part of a face; empties are preferred. If
-    there is no such object, it is the scene's camera.
+    The proposal is the active object or another selected object, unless it is a part of a face;
+    empties come first. Without such an object, the proposal is the scene's camera.
 
     Args:
         context: context with the selection and the scene.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators for animation by hand: next key, breakdown poses, tweaks, colours of curves."""
 
@@ -26,7 +27,7 @@ _NONE = 0.5  # start factor of a breakdown: half way between the pose before and
 
 
 def control_under_mouse(context: Context) -> str:
-    """The slider of the active face under the mouse, or "".
+    """The name of the active face's slider that is under the mouse, or "".
 
     Args:
         context: context of a shortcut or of a button's context menu.
@@ -151,7 +152,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         now, paths, factor = keying.pose_of(controls), self._paths(context), self.factor
         if self.kind == "REST":
             return between.move(rig, now, between.rest_pose(rig, now), factor, paths)
-        # Controls without an F-curve have no earlier or later pose.
+        # A control without an F-curve has no key before or after the frame, so it is left out.
         paths &= set(keying.curves_by_path(controls))
         skipped = keying.selected_frames(controls) if self.at == "SELECTED" else ()
         found = between.neighbours(controls, self._frame, now, paths, skipped)
@@ -176,7 +177,10 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         return {"RUNNING_MODAL"}
 
     def _preview(self, context: Context) -> bool:
-        """Show the pose at the current factor. Returns whether it exists."""
+        """Show the breakdown pose at the current factor.
+
+        Returns False after an error, which is reported.
+        """
         keying.show(face_controls(context), self._start)
         try:
             self.move(context)
@@ -215,11 +219,11 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
 
 
 def proposed_range(context: Context) -> tuple[int, int]:
-    """First and last frame for a tweak.
+    """The proposed first and last frame of a tweak.
 
-    The range of the selected keyframes, or the preview range, or else frames around the current
-    one. If all keyframes are selected, the selection is ignored, because an import selects them.
-    A single selected keyframe is ignored, too.
+    The proposal is the range of the selected keyframes, if they are at two or more frames, but not
+    at all frames with keyframes, as after an import. Otherwise it is the preview range, or without
+    one the range from 12 frames before to 12 frames after the current frame.
 
     Args:
         context: context with the face and the scene.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators of live capture: start, stop, record, neutral face, subject."""
 
@@ -74,7 +75,11 @@ class RISORIUS_OT_live_start(Operator):
 
 
 def _session(context: Context) -> sessions.Session:
-    """The capture of the active face. Raises: FaceError: no capture runs."""
+    """The running capture of the active face.
+
+    Raises:
+        FaceError: no capture of the active face is running.
+    """
     session = sessions.of(active_controls(context))
     if session is None:
         raise FaceError(_NOT_STARTED)
@@ -226,15 +231,17 @@ def _finish(
     context: Context,
     finish: Callable[[ArmatureObject, bpy.types.Scene], clip_actions.Report | None],
 ) -> bool:
-    """Convert a recording to an action and report it.
+    """Convert a recording to an action of the active face, and report the action or the error.
 
     Args:
         operator: operator that reports.
         context: context with the face and the scene.
-        finish: function that converts; called with the face's armature and the scene.
+        finish: function that converts the recording; it gets the face's deforming armature and
+            the scene, and returns None for an empty recording.
 
     Returns:
-        Whether an action was made. After an error, the recording waits to be finished.
+        Whether an action was made. After an error, the recording stays in the list of waiting
+        recordings.
     """
     rig = face_rig(context)
     try:

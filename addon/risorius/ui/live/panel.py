@@ -49,7 +49,7 @@ class RISORIUS_PT_live(FaceOnlyPanel, Panel):
 
 
 def _where(chosen: RISORIUS_PG_live) -> str:
-    """A sentence with the address that the user types into the capture app."""
+    """A sentence with the IP address and the port that the user types into the capture app."""
     if not chosen.everywhere:
         return words.say("Hears this computer only, at 127.0.0.1, port {port}.", port=chosen.port)
     address = capture.address() or words.say("this computer's address")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The user's settings of live capture, stored with the window manager."""
 
@@ -97,7 +98,7 @@ def choices(context: Context) -> RISORIUS_PG_live:
 
 
 def settings_of(context: Context) -> sessions.Settings:
-    """The user's settings as an object for a capture; an empty mapping becomes "arkit"."""
+    """The user's settings as an object for a capture; without a mapping file it gets "arkit"."""
     chosen = choices(context)
     return sessions.Settings(
         chosen.source,

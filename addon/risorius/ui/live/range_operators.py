@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators for the capture range of a face: learn, load, save, remove."""
 
@@ -19,7 +20,7 @@ from ..words import of_error, say
 
 
 class _Learns(FaceOperator):
-    """Base of operators that learn a range."""
+    """Base of operators that learn the capture range of a person and store it with a face."""
 
     baked_too = True
 
@@ -35,7 +36,7 @@ class _Learns(FaceOperator):
     )
 
     def keep(self, context: Context, clip: "native.Clip", performance: bool) -> None:
-        """Learn a range from a captured clip and store it with the active face.
+        """Learn a capture range from a captured clip and store the range with the active face.
 
         Args:
             context: context with the face.

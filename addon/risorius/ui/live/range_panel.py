@@ -10,7 +10,7 @@ from ..blender_types import Context, Panel, UILayout, UIList
 from ..common import FaceOnlyPanel, face_controls
 
 _PREFIX = "CTRL_expressions."
-# Reasons that risorius.ranges.learn gives for unused controls.
+# Reasons of risorius.ranges.learn for not stretching a control, marked for the translation.
 _REASONS = (
     words.mark("gaze is an angle"),
     words.mark("hardly moves"),
@@ -23,7 +23,7 @@ _REASONS = (
 
 
 class RISORIUS_UL_ranges(UIList):
-    """One line per control, with its neutral and its extreme value."""
+    """One line per control, with its neutral and its extreme value in the captures of a person."""
 
     def draw_item(
         self,
@@ -82,7 +82,10 @@ class RISORIUS_PT_ranges(FaceOnlyPanel, Panel):
 
 
 def _draw_chosen(layout: UILayout, row: range_properties.RISORIUS_PG_range) -> None:
-    """Draw the gain of the selected control, or the reason why it is not stretched."""
+    """Draw the gain of the selected control, or the reason why the control is not stretched.
+
+    The gain is the factor by which captured values are stretched.
+    """
     if row.used:
         gain = f"{1.0 / max(row.extreme - row.neutral, 0.01):.2f}"
         words.show(layout, words.say("Gain {gain}", gain=gain))

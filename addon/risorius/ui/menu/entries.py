@@ -206,7 +206,8 @@ class RISORIUS_MT_face_about(Menu):
 
     def draw(self, context: Context) -> None:
         layout = self.layout
-        # Names of Blender's operators are not in our translation table, so give a translated text.
+        # The add-on's translation table does not contain the names of Blender's operators, so the
+        # button gets a translated text.
         text = words.say("Preferences")
         layout.operator(
             "preferences.addon_show", text=text, icon="PREFERENCES", translate=False

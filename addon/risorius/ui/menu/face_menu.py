@@ -54,7 +54,7 @@ class RISORIUS_MT_face(Menu):
 
 
 def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
-    """Draw the most frequent actions."""
+    """Draw entries for frequent actions: rest, keys, expressions, tweaks, copied poses."""
     layout.operator("risorius.reset", icon="LOOP_BACK").region = ""
     layout.operator("risorius.rest_others")
     layout.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
@@ -73,8 +73,8 @@ def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
 def draw_header(self: Menu, context: Context) -> None:
     """Draw the menu Face in the header, in object mode and pose mode.
 
-    Blender's search also uses the names of the menus that contain an entry, so the name of the
-    add-on finds every command.
+    Blender's search matches the names of the menus that contain an entry, too. The menu's label
+    contains "Risorius", so a search for this word finds every entry.
 
     Args:
         self: the menu with the header's menus.

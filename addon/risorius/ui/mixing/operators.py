@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators of Mix Faces: add and remove faces, show the preview, write the file."""
 
@@ -20,10 +21,11 @@ from .properties import choices, follow, paths_of, shares_of
 
 
 def _not_mixed(own: Mapping[str, str]) -> list[str]:
-    """Sentences about textures that were not mixed, except hair, which is never mixed.
+    """Sentences about textures that were not mixed; hair textures, which never are, are left out.
 
     Args:
-        own: name of a texture -> reason why it was not mixed.
+        own: name of a texture -> reason why it was not mixed, such as "missing"; for "missing",
+            "format" and "size" there is a sentence.
     """
 
     def names(why: str) -> str:
@@ -46,8 +48,10 @@ def _not_mixed(own: Mapping[str, str]) -> list[str]:
 
 
 def _add(operator: Operator, context: Context, paths: list[str]) -> Result:
-    """Add faces to the mix; faces that cannot be read or do not match its first face are reported
-    and left out, and so are, without a report, faces that it has already.
+    """Add faces to the mix.
+
+    A face that cannot be read, or does not match the first face of the mix, is reported and not
+    added. A face that the mix contains already is skipped without a report.
 
     Args:
         operator: operator that reports.
@@ -198,7 +202,7 @@ class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
         except (OSError, *native.user_errors()) as error:
-            # If the file of a mixed face is missing, the error contains its name.
+            # If the DNA file of a mixed face is missing, the error contains the path of that file.
             name = getattr(error, "filename", None) or self.filepath
             self.report({"ERROR"}, explain(name, error))
             return {"CANCELLED"}

@@ -21,8 +21,8 @@ class RISORIUS_PT_mix(FacePanel, Panel):
     def poll(cls, context: Context) -> bool:
         """Whether no face is active.
 
-        While a face is active, another panel Mix Faces is in Options, because the tab then has no
-        room for it on a laptop's screen.
+        While a face is active, the panel Options contains a second panel Mix Faces instead, because
+        on a laptop's screen the tab then has no room for one more panel.
         """
         return active_controls(context) is None
 
@@ -41,7 +41,7 @@ class RISORIUS_PT_mix_here(FaceOnlyPanel, Panel):
 
 
 def draw_mix(layout: UILayout, context: Context) -> None:
-    """Draw the faces of the mix and its actions.
+    """Draw the faces of the mix with their shares, and buttons that change, show and write the mix.
 
     Args:
         layout: layout of the panel.

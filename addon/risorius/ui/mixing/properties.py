@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Stores the faces to mix and their shares; a change updates the preview."""
 
@@ -24,7 +25,7 @@ _HERE = "Share of this face in this region; the rest of the region follows the w
 
 
 class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
-    """A face that is mixed."""
+    """A face of the mix: its DNA file, and its shares in the mix and in each region."""
 
     path: bpy.props.StringProperty(name="File", subtype="FILE_PATH")
     share: bpy.props.FloatProperty(
@@ -70,9 +71,10 @@ def paths_of(context: Context) -> list[str]:
 
 
 def shares_of(context: Context) -> tuple[list[float], dict[str, dict[int, float]]]:
-    """The share of each face, and region -> index of a face -> its share of that region.
+    """The share of each face in the whole mix, and the shares of faces in single regions.
 
-    If the shares of a region sum to more than 1, they are divided by their sum.
+    The second result is region -> index of a face -> share of this face in the region, with only
+    shares above 0. If the shares of a region sum to more than 1, they are divided by their sum.
 
     Args:
         context: context of Blender.
@@ -88,9 +90,10 @@ def shares_of(context: Context) -> tuple[list[float], dict[str, dict[int, float]
 
 
 def follow(context: Context) -> None:
-    """Update the preview, if it exists, to the shares of the sliders.
+    """Update the preview of the mix, if it exists, after a change of the faces or their shares.
 
-    The preview stays unchanged while all shares are 0, and is removed if a file cannot be read.
+    The preview stays unchanged while all shares are 0, and is removed if the DNA
+    file of a face cannot be read.
 
     Args:
         context: context of Blender.

@@ -47,8 +47,10 @@ def stop() -> None:
 
 
 class _Pen:
-    """Draws boxes, lines and text; text grows with the interface scale. Places are pixels from the
-    lower left corner of the region."""
+    """Draws boxes, lines and text over a region; the size of text follows the interface scale.
+
+    All places are in pixels from the lower left corner of the region.
+    """
 
     def __init__(self, context: Context) -> None:
         self.scale: float = context.preferences.system.ui_scale
@@ -69,7 +71,7 @@ class _Pen:
         batch.draw(self.flat)
 
     def text(self, text: str, x: float, y: float, colour: Colour = _WHITE) -> float:
-        """Draw a line of text. Returns its width in pixels."""
+        """Draw a line of text. Returns the width of the text in pixels."""
         blf.size(0, self.size)
         blf.color(0, *colour)
         blf.position(0, x, y, 0)
@@ -81,7 +83,7 @@ class _Pen:
         return float(blf.dimensions(0, text)[0])
 
     def cut(self, text: str, most: float) -> str:
-        """The text, shortened with dots if it is wider than `most` pixels."""
+        """The text; if it is wider than `most` pixels, it is cut and ends with three dots."""
         if self.width(text) <= most:
             return text
         while text and self.width(text + "...") > most:
@@ -117,7 +119,10 @@ def _tools(context: Context) -> int:
 
 
 def _draw_ramp(pen: _Pen, text: str, shown: heat.Heat, x: float, y: float) -> float:
-    """Draw the colours with their range in mm. Returns the next free height in pixels."""
+    """Draw the colour scale of a heat map, from 0 to the largest motion in mm, and its title.
+
+    Returns the height above the scale at which the next text can be drawn, in pixels.
+    """
     width, height, unit = 220.0 * pen.scale, 14.0 * pen.scale, pen.scale
     full = max(width, pen.width(text)) + 20 * unit
     pen.box(x - 10 * unit, y - 8 * unit, full, height + 48 * unit, _BOX)
@@ -133,7 +138,7 @@ def _draw_ramp(pen: _Pen, text: str, shown: heat.Heat, x: float, y: float) -> fl
 
 
 def look_in_words(context: Context, look: look_masks.Look) -> str:
-    """A sentence about the solo and mute state of a face; "" for neither.
+    """The soloed controls and muted parts of a face as a text; "" if there are none.
 
     Args:
         context: context with the preferences.
@@ -163,8 +168,10 @@ def _draw_look(pen: _Pen, sentence: str, x: float, y: float) -> float:
 
 
 def _draw_graph(pen: _Pen, context: Context, rig: ArmatureObject, x: float, y: float) -> None:
-    """Draw the chosen control on the left, and on the right the first nine correctives that depend
-    on it, with the number of the others."""
+    """Draw the chosen control on the left, and the correctives that depend on it on the right.
+
+    At most the first nine correctives are drawn; below them is the number of the others.
+    """
     label, now = choices(context).control, present.of(rig)
     control = causes.control_of(rig, label)
     if control < 0 or now is None:

@@ -15,7 +15,7 @@ from .properties import choices
 from .spoken import spoken, title
 
 _ROWS = 10  # most rows of a list
-# True: a timer will compute the strongest correctives.
+# True: a timer is registered that will compute the strongest correctives of all faces.
 _soon = session.value("see_why.panel.soon", False, ("load",))
 
 
@@ -97,7 +97,14 @@ def _draw_more(layout: UILayout, count: int) -> None:
 
 
 def _draw_cause(layout: UILayout, context: Context, cause: causes.Cause, most: float) -> None:
-    """Draw a cause: name, motion in mm, and buttons for its heat map and solo."""
+    """Draw a control or corrective that moves a vertex: name, motion in mm, heat map and solo.
+
+    Args:
+        layout: layout of the panel.
+        context: context of the panel.
+        cause: the control or corrective.
+        most: motion in mm at which the bar is full.
+    """
     row, name = layout.row(align=True), spoken(context, cause.name)
     if cause.now:
         text = words.say("{name}  {now:.2f} mm", name=name, now=cause.now)
@@ -156,7 +163,10 @@ def _draw_strongest(layout: UILayout, context: Context, rig: ArmatureObject) -> 
 
 
 def _ask_soon() -> None:
-    """Compute the strongest correctives 0.2 s later, so that a dragged slider need not wait."""
+    """Let a timer compute the strongest correctives of all faces in 0.2 s.
+
+    Without the delay, each drawing of the panel while a slider is dragged would wait for them.
+    """
     if not _soon.now:
         _soon.now = True
         bpy.app.timers.register(_ask, first_interval=0.2)

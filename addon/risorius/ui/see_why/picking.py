@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The operator What Moves This Vertex.
 
@@ -117,7 +118,11 @@ def _redraw(context: Context) -> None:
 
 
 def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
-    """Index of the face's active mesh and of its first selected vertex; -1 for none."""
+    """Index of the active mesh in the DNA file, and of the first selected vertex of this mesh.
+
+    Both are -1 if the active object is no mesh of the face; the second is -1 if no vertex is
+    selected.
+    """
     item = context.object
     if item is None or item.type != "MESH" or parts.rig_of(item) != rig:
         return -1, -1
@@ -131,15 +136,15 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
 
 
 def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int, int] | None:
-    """The face under the cursor: armature, index of the mesh in the DNA file, index of the vertex
-    nearest to the cursor.
+    """The face under the cursor, and the vertex nearest to the cursor.
 
     Args:
         context: context of Blender.
         event: event with the place of the cursor in the window.
 
     Returns:
-        None if there is no face under the cursor.
+        Deforming armature of the face, index of the mesh in the DNA file, and index of the vertex
+        in the mesh; None if there is no face under the cursor.
     """
     area = context.area
     if area is None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The settings of See Why, stored with the window manager."""
 
@@ -15,7 +16,7 @@ from ..blender_types import Context
 
 
 def _labels(_self: bpy.types.PropertyGroup, given: bpy.types.Context, typed: str) -> Iterator[str]:
-    """The sliders of the active face that match the typed words."""
+    """The names of the active face's sliders that match the words typed in the search field."""
     rig = parts.active_rig(cast(Context, given))
     live = runtime.of(rig) if rig is not None else None
     labels = live.labels if live is not None else ()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Assigns unknown curves of an imported file to controls, and saves the mapping."""
 
@@ -30,13 +31,13 @@ _MOST = 40  # largest number of drawn lines
 
 
 class _OfCurves(FaceOperator):
-    """Base of operators on unknown curves."""
+    """Base of operators on the curves of the last import whose names no mapping contains."""
 
     baked_too = True
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the face has unknown curves; if not, set the poll message."""
+        """Whether the face has unknown curves of its last import; if not, set the poll message."""
         if not super().poll(context):
             return False
         if unknown_curves.of(face_controls(context)) is None:

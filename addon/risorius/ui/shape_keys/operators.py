@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that assign shape keys to controls, save and load assignments, and draw pictures."""
 
@@ -39,7 +40,8 @@ WAYS = (
 _AT_ONCE = 6  # number of new pictures after which the sidebar is redrawn
 
 EnumItem = tuple[str, str, str, int, int]
-# Items of an enum, kept alive here because Blender keeps no references to their strings.
+# Items of the enum with all controls and expressions. They are kept here, because Blender keeps no
+# references to the strings of enum items.
 _items: list[EnumItem] = session.keep("shape_keys.items", list, ("unregister",))
 
 
@@ -68,7 +70,7 @@ def head_of(context: Context) -> MeshObject:
 
 
 class Says(OfHead):
-    """Base of operators that assign a shape key."""
+    """Base of operators that assign a control or an expression to a shape key."""
 
     key: bpy.props.StringProperty(
         name="Shape Key",
@@ -88,12 +90,12 @@ class Says(OfHead):
         return True
 
     def keep(self, context: Context, value: assigned.Said | None) -> Result:
-        """Store the user's assignment of the key.
+        """Store the user's assignment of the shape key `key`; if `key` is "", of the active one.
 
         Args:
             context: context of Blender.
-            value: the value of an assigned.Choice; [] leaves the key out; None removes the user's
-                assignment.
+            value: `value` of an assigned.Choice, a control or expression; []: the key is left out
+                of the rig; None: the user's assignment is removed.
         """
         item = head_of(context)
         name = self.key or shown.active_key(item)
@@ -141,12 +143,13 @@ def _listed(_self: object, _context: object) -> Any:  # noqa: ANN401  stubs know
     return _items
 
 
-# An enum item may contain the number of an icon, which Blender's stubs do not know.
+# An enum item may contain the number of an icon, which the type stubs of Blender's API do not know.
+# So `_listed` returns Any.
 choice_items = _listed
 
 
 def fill_choices() -> None:
-    """Fill the enum with the choices and their existing pictures."""
+    """Fill the enum with all controls and expressions, and their pictures if these exist."""
     _items[:] = [
         (
             choice.value,

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The panel Names of Shape Keys: each key of a head with its picture and assignment."""
 
@@ -25,8 +26,8 @@ from . import shown
 _ROWS = 5
 _PICTURE = 6.0  # height of the large picture, in lines
 _LITTLE = 2.0  # height of a picture in the list, in lines
-# (session uid of a head's mesh, value of the assigned.Choice whose sample picture is shown) for
-# which the panel has already started to draw missing pictures.
+# Pairs for which the panel has already started to draw missing pictures: session uid of a head's
+# mesh, and value of the assigned.Choice whose picture of the sample man is shown.
 _asked: set[tuple[int, str]] = session.keep("shape_keys.asked", set, ("undo", "load"))
 
 
@@ -60,7 +61,8 @@ class RISORIUS_UL_shape_key_names(UIList):
         both = line.column(align=True)
         words.show(both, item.name)
         below = both.row(align=True)
-        # Blender's list reacts to clicks on its first line only, so the second line is a button.
+        # Blender's list selects an item only by a click on its first line. So the second line is a
+        # button that selects the shape key.
         below.alignment = "LEFT"
         is_open = not row.is_known and not row.is_said
         below.active = is_open or row.is_said
@@ -72,7 +74,12 @@ class RISORIUS_UL_shape_key_names(UIList):
         button.key = item.name
 
     def draw_filter(self, context: Context, layout: UILayout) -> None:
-        """Draw the filter below the list. Args: context, layout  passed by Blender."""
+        """Draw the search field and the filter of unknown names below the list.
+
+        Args:
+            context: context of the panel.
+            layout: layout of the filter.
+        """
         row = layout.row(align=True)
         row.prop(self, "filter_name", text="", icon="VIEWZOOM")
         row.prop(self, "only_unknown", text="", icon="QUESTION")
@@ -93,7 +100,8 @@ class RISORIUS_UL_shape_key_names(UIList):
 
         flags = [self.bitflag_filter_item if is_shown(name) else 0 for name in names]
         known = [name in rows and rows[name].is_known for name in names]
-        # Sort unknown names first, regardless of assignments, so that an assignment moves no row.
+        # Shape keys with unknown names come first, whether the user has assigned them or not. So no
+        # row moves when the user makes an assignment.
         ranked = sorted(range(len(names)), key=known.__getitem__)
         order = [0] * len(names)
         for place, index in enumerate(ranked):
@@ -151,7 +159,7 @@ def _draw_count(layout: UILayout, names: assigned.Names) -> None:
 
 
 def _draw_one(layout: UILayout, row: assigned.Row, picture: int, sample: str) -> None:
-    """Draw the active shape key's picture, the sample man's picture of its control, and buttons."""
+    """Draw pictures of the active shape key and of its control on the sample man, and buttons."""
     box = layout.box()
     pair = box.split(factor=0.5)
     _draw_picture(pair.column(align=True), picture, row.key)
@@ -184,7 +192,12 @@ def _icon(paths: Mapping[str, Path] | None, key: str) -> int:
 
 
 def _ask_once(mesh: int, sample: str) -> None:
-    """Start to draw missing pictures after the panel is drawn, once for each mesh and sample."""
+    """Start drawing missing pictures after the panel is drawn, once for each pair.
+
+    Args:
+        mesh: session uid of the head's mesh.
+        sample: value of the assigned.Choice whose picture of the sample man is shown.
+    """
     if (mesh, sample) in _asked or bpy.app.background:
         return
     _asked.add((mesh, sample))
@@ -192,7 +205,10 @@ def _ask_once(mesh: int, sample: str) -> None:
 
 
 def _begin() -> None:
-    """Start the operator that draws pictures; called by a timer, because panels must not do it."""
+    """Start the operator that draws pictures.
+
+    A timer calls this, because a panel must not call operators while it is drawn.
+    """
     context, operators = current_context(), cast(Any, bpy.ops)
     with context.temp_override(window=context.window_manager.windows[0]):
         if operators.risorius.shape_key_pictures.poll():

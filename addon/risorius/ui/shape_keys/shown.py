@@ -25,7 +25,11 @@ def active_key(item: MeshObject) -> str:
 
 
 def label_of_choice(choice: assigned.Choice) -> str:
-    """The searchable label of a choice. Args: choice  one of assigned.choices."""
+    """The label of a control or expression in the list of choices, in which the user searches.
+
+    Args:
+        choice: one of assigned.choices.
+    """
     if choice.kind == assigned.UNIT:
         return f"{choice.label} (ARKit)"
     if choice.kind == assigned.EXPRESSION:
@@ -39,7 +43,7 @@ def tooltip_of_choice(choice: assigned.Choice) -> str:
 
 
 def becomes(row: assigned.Row) -> str:
-    """The assignment of a shape key in a few words, in the user's language.
+    """A shape key's assignment in a few words of the user's language: the control or expression.
 
     Args:
         row: row of the shape key, from assigned.of.
@@ -60,7 +64,9 @@ def becomes(row: assigned.Row) -> str:
 
 
 def who_knows(row: assigned.Row) -> str:
-    """A sentence about the source of an assignment, or about the shape key that has the control.
+    """A sentence that says who assigned a shape key: the user, a vocabulary, or nobody.
+
+    If another shape key already has the control, the sentence names this other shape key.
 
     Args:
         row: row of the shape key, from assigned.of.
@@ -82,7 +88,10 @@ def who_knows(row: assigned.Row) -> str:
 
 
 def words_of_controls(controls: tuple[str, ...]) -> str:
-    """A short text for controls: title, equivalent ARKit shape, or first title and "and 3 more".
+    """A short text for controls, for example "Jaw Open".
+
+    It is the title of a single control, or the ARKit shape that equals the controls together, or
+    the title of the first control and the number of the others.
 
     Args:
         controls: names of controls without their prefix.
@@ -97,10 +106,11 @@ def words_of_controls(controls: tuple[str, ...]) -> str:
 
 
 def words_of_value(value: str) -> str:
-    """A choice in a few words, in the user's language.
+    """A control or expression in a few words, in the user's language.
 
     Args:
-        value: value of an assigned.Choice; "" means left out; an unknown value is returned.
+        value: value of an assigned.Choice; "": the words for a key that is left out; a value that
+            no choice has is returned unchanged.
     """
     if not value:
         return words.say("Left out")
@@ -122,8 +132,8 @@ def value_of(row: assigned.Row) -> assigned.Said:
 def sample_of(row: assigned.Row) -> str:
     """The value of the assigned.Choice that a shape key is assigned to; "" for none.
 
-    For several controls that are no unit of ARKit, it is the first control. The panel shows the
-    picture of the sample man for this value.
+    If the key is assigned to several controls that no ARKit shape stands for, the result is the
+    first control. The panel shows the sample man's picture for this value.
 
     Args:
         row: row of the shape key, from assigned.of.

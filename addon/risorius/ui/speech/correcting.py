@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators that correct the sounds, words and markers of a voice."""
 
@@ -38,9 +39,9 @@ def are_moved(context: Context, action: bpy.types.Action) -> bool:
 
 
 class _Corrects(FaceOperator):
-    """Base of all corrections; each updates keyframes and markers, and reports errors."""
+    """Base of operators that correct a voice; they update keys and markers, and report errors."""
 
-    reads_markers = False  # True: usable while changed markers are not applied
+    reads_markers = False  # True: available while changed markers are not applied
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -67,12 +68,16 @@ class _Corrects(FaceOperator):
         return {"FINISHED"}
 
     def _correct(self, context: Context, action: bpy.types.Action) -> None:
-        """Make the correction. Raises: SpokenError and other errors that a user can mend."""
+        """Correct the voice.
+
+        Raises:
+            native.user_errors(): any of these errors is reported to the user.
+        """
         raise NotImplementedError
 
 
 class _CorrectsSound(_Corrects):
-    """Base of corrections of one sound of the list."""
+    """Base of operators that correct one sound of the list in the panel Speech."""
 
     place: bpy.props.IntProperty(
         name="Place",
@@ -102,12 +107,31 @@ class _CorrectsSound(_Corrects):
     def _corrected(
         self, sounds: Sequence[Sound], place: int, end: float
     ) -> tuple[list[Sound], int]:
-        """The sounds after a correction of sounds[place]; index to select. Raises: SpokenError."""
+        """Correct one sound.
+
+        Args:
+            sounds: all sounds of the voice.
+            place: index of the sound to correct.
+            end: frame at which the last sound ends.
+
+        Returns:
+            All sounds after the correction, and the index of the sound to select.
+
+        Raises:
+            SpokenError: the correction is not possible.
+        """
         raise NotImplementedError
 
 
 def _phoneme(text: str) -> str:
-    """The phoneme for the name of a mouth shape or phoneme. Raises: SpokenError: unknown name."""
+    """The phoneme that a typed name means.
+
+    Args:
+        text: a mouth shape such as "M B P", or a phoneme such as "AA".
+
+    Raises:
+        SpokenError: no mouth shape or phoneme has this name.
+    """
     name = spoken_markers.named(text)
     if name is None:
         raise SpokenError(

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """The operator Speak from Audio: animates the face from a sound file and adds its sound strip."""
 
@@ -130,8 +131,8 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             accents=self.use_accents,
             correctable=True,
             library=self._own or None,
-            # The voice is animated at the scene's frame rate and not resampled, so that lips meet
-            # exactly on a frame.
+            # With whole frames, the voice is animated at the scene's frame rate. Resampled from
+            # another rate, closed lips could fall between two frames.
             rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
         self._face = rig.session_uid
@@ -145,7 +146,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return words.say("Speak from Audio was cancelled.")
 
     def finish(self, context: Context) -> Result:
-        """Place the animation on the face, unless the face was deleted or is not active."""
+        """Place the animation on the face, if the face for which it was made is still active."""
         task = self._task
         try:
             if task.result is None:
@@ -180,7 +181,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return clip_actions.timing_of(clip, context.scene, self.start, keep_clock=True, whole=whole)
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """Settings of a voice's layer, which moves the face only during the sound.
+        """Properties of the layer that plays the voice; it moves the face only during the sound.
 
         Args:
             context: context with the scene, which has the frame rate.

@@ -19,8 +19,10 @@ from .correcting import (
 
 
 class RISORIUS_UL_sounds(UIList):
-    """One line per sound: the word that begins with this sound, if any; the mouth shape; start and
-    length in frames."""
+    """One line per sound: word, mouth shape, start and length in frames.
+
+    The word is shown only on the line of its first sound.
+    """
 
     def draw_item(
         self,
@@ -42,7 +44,7 @@ class RISORIUS_UL_sounds(UIList):
 
 
 class RISORIUS_MT_phonemes(Menu):
-    """All phonemes of English, by the mouths that they look like."""
+    """All phonemes of English, each with the mouth shape that it looks like."""
 
     bl_idname = "RISORIUS_MT_phonemes"
     bl_label = "Phonemes"
@@ -57,7 +59,7 @@ class RISORIUS_MT_phonemes(Menu):
 
 
 class RISORIUS_MT_mouths(Menu):
-    """The mouths that a sound can look like."""
+    """The mouth shapes by which a sound can be replaced."""
 
     bl_idname = "RISORIUS_MT_mouths"
     bl_label = "Replace Sound"

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Blender reads its properties from annotations, which a type checker takes for types:
+# Blender defines properties by annotations. A type checker would report that these annotations
+# are no types, so this check is off in this file:
 # pyright: reportInvalidTypeForm=false
 """Operators and texts for faces that are linked from other files or have lost parts."""
 
@@ -32,7 +33,7 @@ SHAPES = (
 def override_trouble(rig: ArmatureObject | None) -> str:
     """The reason why a face with a library override does not move.
 
-    "" if the face moves, has no override, or is None.
+    The result is "" if the face moves or has no library override, or if `rig` is None.
     """
     if rig is None or not rig.override_library:
         return ""

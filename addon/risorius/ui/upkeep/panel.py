@@ -16,7 +16,7 @@ def draw_trouble(layout: UILayout, context: Context) -> bool:
         context: context with the active object.
 
     Returns:
-        True: nothing else shall be drawn in the panel.
+        True if the caller should draw nothing else in the panel.
     """
     linked, active = library_overrides.linked_rig(context), parts.active_rig(context)
     shown = linked or active

@@ -338,7 +338,7 @@ class ClipReader:
         byte_count: bytes of the file that belong to the clip; fewer than the file's size only after
             a recovery.
         block_starts: index of the first frame of each block, and at the end the frame count.
-        events: events of the whole clip, in the file's order.
+        events: events of the whole clip, in the order in which the file stores them.
         metadata: facts about the clip, such as source, take and actor.
     """
 

@@ -387,8 +387,15 @@ def _gaze_curves(times: Doubles, saccades: list[Saccade], life: Life) -> dict[st
 
 
 def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[str, Doubles]:
-    """Curves of subtle motion. The curve of each side is three quarters common motion and one
-    quarter motion of its own; the jaw has one curve."""
+    """Curves of subtle motion, control name without prefix -> float64[times]. The curve of each
+    side is three quarters common motion and one quarter motion of its own; the jaw has one curve.
+
+    Args:
+        seed: 0 or more; the same seed gives the same curves.
+        times: float64[frames], seconds.
+        scale: factor of all curves, the attribute `micro` of Life.
+        loop: True: the curves end as they begin.
+    """
     out = {}
     for stream, (name, (amount, step)) in enumerate(MICRO.items()):
         common, left, right = (
@@ -408,9 +415,9 @@ def _raised(noise: Doubles) -> Doubles:
 
 
 def _noise(dice: _Dice, times: Doubles, step: float, loop: bool) -> Doubles:
-    """Slow noise in [-1, 1]: four fifths of a random cubic B-spline with a point every `step`
-    seconds, plus one fifth of a spline with a point every 0.36 * `step` seconds. Periodic only if
-    `loop` is True."""
+    """Slow noise in [-1, 1], float64[times]: 0.8 times a cubic B-spline with a random control point
+    every `step` seconds, plus 0.2 times such a spline with a control point every 0.36 * `step`
+    seconds. The noise is periodic only if `loop` is True."""
     return 0.8 * _spline(dice, times, step, loop) + 0.2 * _spline(dice, times, 0.36 * step, loop)
 
 

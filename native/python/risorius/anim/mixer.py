@@ -207,7 +207,8 @@ class Mixer:
             strength: factor of the reaction, 0 to 1.
 
         Returns:
-            False without effect, if max_fired reactions have not ended by `time`.
+            True if the reaction was started; False if it was not, because max_fired reactions
+            that were started earlier have not ended by `time`.
 
         Raises:
             KeyError: unknown reaction. ValueError: time or strength out of range.
@@ -233,7 +234,7 @@ class Mixer:
         return count
 
     def clear_fired(self) -> None:
-        """Remove all firings."""
+        """Remove all reactions that fire() started, also those in the future."""
         self._core.clear_fired()
 
     def evaluate(
@@ -276,7 +277,8 @@ class Mixer:
         return Clip(self.names, frames.T, rate, start=start)
 
     def _curves(self, layer: Layer) -> LayerCurves:
-        """A layer's native curves, reused from an existing layer with the same source and mask."""
+        """A layer's curves and mask as an object of the native mixer. An existing layer with the
+        same source and mask shares its object."""
         for old, curves in self._layers:
             if old.source is layer.source and old.mask is layer.mask:
                 return curves

@@ -48,7 +48,7 @@ class Reaction:
 
     @property
     def duration(self) -> float:
-        """Seconds from the firing until all controls are at rest."""
+        """Seconds from the start of the reaction until its effect on all controls has ended."""
         return max((p.delay + p.attack + p.hold + p.release for p in self.parts), default=0.0)
 
     def parts_of(self, index: Index) -> list[_Part]:
@@ -66,7 +66,8 @@ class Reaction:
 class Yield:
     """A rule: active controls `by` weaken each control in `of` by a factor.
 
-    The factor is 1 - amount * m; `measure` says whether m is the maximum, minimum or mean of `by`.
+    The factor is 1 - amount * m, where m is the maximum, minimum or mean (see `measure`) of the
+    values of the controls `by`.
     """
 
     name: str

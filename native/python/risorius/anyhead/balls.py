@@ -14,7 +14,8 @@ from ..author.heads.parts import HeadPart
 
 _LEAST = 12  # smallest number of vertices of a sphere
 _MOST = 400  # meshes with more islands, such as hair, are skipped
-# Size of an island / longest side of the box around all meshes; larger islands are no eyes.
+# An island is no eye if its longest side is at least this fraction of the longest side of the
+# bounding box of all meshes.
 _LARGE = 0.3
 _ALIKE = 0.1  # largest difference of both radii of a pair, as a fraction of the larger radius
 _APART = (2.0, 9.0)  # least and largest distance of the centres of a pair, in larger radii

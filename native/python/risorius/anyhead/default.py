@@ -45,7 +45,8 @@ def default_template() -> Path:
 
 
 def _is_complete(path: Path) -> bool:
-    """Whether a DNA file can be loaded; it cannot after a full disk, for example."""
+    """Whether a DNA file can be loaded. It cannot be loaded if, for example, the disk became full
+    while the file was written."""
     try:
         load(path)
     except (DnaError, OSError):
@@ -54,7 +55,8 @@ def _is_complete(path: Path) -> bool:
 
 
 def _remove_earlier(folder: Path) -> None:
-    """Removes templates that earlier code with the same version number built."""
+    """Removes cached templates that other code with the version number of this package built, for
+    example during development."""
     for path in folder.parent.glob(f"template-{__version__}-*"):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)

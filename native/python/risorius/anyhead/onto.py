@@ -51,7 +51,8 @@ _JOINT = np.array([[0.0, -4.0, -6.0]])  # cm: head joint in the space of HeadFor
 # Finished share of the work, 0 to 1, after finding the face, reading the template, registering the
 # template onto the head, and transferring the displacements.
 _FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.8
-# The same after fitting missing meshes, adding up correctives, repair, and moving lashes and brows.
+# Finished share of the work, 0 to 1, after fitting missing meshes, adding up correctives, repairing
+# lids and lips, and moving lashes and brows.
 _COMPLETE, _WHOLE, _MENDED, _JOINED = 0.83, 0.85, 0.97, 0.99
 
 
@@ -183,7 +184,12 @@ def _mended(
 
 
 def _of_length(ways: SparseShapes[Pose], *, single: bool) -> SparseShapes[str]:
-    """The displacements of single controls or of combinations, by their names joined by +."""
+    """The displacements of some poses; the key of a pose is the names of its controls, joined by +.
+
+    Args:
+        ways: the displacements of all poses.
+        single: True: only poses of one control; False: only poses of several controls.
+    """
     out = SparseShapes[str](ways.count)
     for pose in ways:
         if (len(pose) == 1) == single:

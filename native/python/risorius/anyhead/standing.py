@@ -25,7 +25,7 @@ from .telling import Progress
 
 _FLAT = 1e-3  # smallest side of a head's bounding box, as a fraction of its longest side
 _SNAP = 20.0  # degrees: a head that leans less is turned by right angles only
-# kinds of meshes, see web.kinds, in which no face is searched
+# Kinds of meshes, as the module web.kinds names them, in which no face is searched for.
 _ASIDE = ("hair", "cloth", "lashes", "teeth", "tongue", "gum", "eyes", "wet")
 
 

@@ -52,7 +52,8 @@ class Surface:
         return np.divide(out, length, out=np.zeros_like(out), where=length > 0)
 
     def edges(self) -> Ints:
-        """int64[E, 2], each edge once, the smaller vertex first."""
+        """int64[E, 2]: the vertices of each edge, the smaller index first; each edge occurs
+        once."""
         return self._edges()[0]
 
     def border(self) -> npt.NDArray[np.bool_]:
@@ -72,7 +73,8 @@ class Surface:
         return np.einsum("nk,nkd->nd", shares, self.points[self.triangles[triangle]])
 
     def _edges(self) -> tuple[Ints, Ints]:
-        """int64[E, 2], each edge once; int64[E], number of triangles at it."""
+        """int64[E, 2]: the vertices of each edge, which occurs once; int64[E]: the number of
+        triangles that have the edge."""
         sides = self.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
         count = max(len(self.points), 1)
         key, times = np.unique(sides.min(axis=1) * count + sides.max(axis=1), return_counts=True)

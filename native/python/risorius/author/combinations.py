@@ -93,7 +93,8 @@ class _Skin:
         return sk.skinned(shaped, self.weights[:, self._own], motions[self._own])
 
     def shaped(self, active: Sequence[int]) -> Doubles:
-        """float64[V, 3]: vertices in the face of joints with its blend shapes, before skinning."""
+        """float64[V, 3]: vertices of the face of joints before skinning, with the blend shapes of
+        the inputs `active` at 1."""
         return np.asarray(
             self.positions
             + sum((self.made_shapes[c] for c in active if c in self.made_shapes), 0.0)
@@ -109,7 +110,8 @@ class _Skin:
         return self._made.bring(shaped, motions)
 
     def rows(self, at: Ints) -> Doubles:
-        """float64[n, joints]: dense weights of some vertices."""
+        """float64[n, joints]: the weights of the vertices `at` on all joints of the face of
+        joints."""
         out = np.zeros((len(at), self._count))
         np.put_along_axis(out, self._made.joints[at], self._made.weights[at], axis=1)
         return out
@@ -126,12 +128,14 @@ class Combinations:
     """The correctives of a face, sorted by the number of their controls."""
 
     def __init__(self, work: Work, options: RigOptions, fewer: Fewer[Work] | None = None) -> None:
-        """Prepare the solution.
+        """Sort the correctives of a face.
 
         Args:
-            work: the face; its meshes are made.
+            work: the face of shapes and the face of joints. The meshes of the face of joints must
+                already have their skin weights and blend shapes.
             options: options of the rig.
-            fewer: simplified meshes for the solution, or None.
+            fewer: simplified meshes on which the joint values are solved; None: the whole meshes
+                are used.
         """
         self.work, self.options, self.fewer = work, options, fewer
         self.columns = sk.column_count(work.source)
@@ -293,7 +297,8 @@ class Combinations:
         return np.asarray(np.linalg.solve(normal, asked).reshape(count, 6))
 
     def values(self) -> Doubles:
-        """float64[new joints, 6, correctives]: joint values of correctives, sorted as `order`."""
+        """float64[new joints, 6, correctives]: the values that each corrective adds to the new
+        joints; the correctives are in the order of self.order."""
         return self.after.deltas[self.order, self.first :, :6].transpose(1, 2, 0)
 
     def finish(

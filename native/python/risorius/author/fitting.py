@@ -184,7 +184,8 @@ def _shapes(
     edges: npt.NDArray[np.uint32],
     importance: Doubles | None = None,
 ) -> _native.FitShapes:
-    """The native form of a mesh and its expressions."""
+    """A mesh and its expressions as an object of the native module; see fit_joints() for the
+    arguments."""
     return _native.FitShapes(
         neutral, displacements, edges, np.zeros(0) if importance is None else importance
     )
@@ -193,14 +194,20 @@ def _shapes(
 def _given(
     positions: Doubles, motions: Doubles, mirrored: Ints | None = None
 ) -> _native.GivenJoints:
-    """The native form of joints float64[J, 3] and their motions float64[E, J, 3, 4]."""
+    """Joints and their motions as an object of the native module.
+
+    Args:
+        positions: float64[J, 3], neutral positions of the joints.
+        motions: float64[E, J, 3, 4], motion of each joint in each expression.
+        mirrored: int64[J], the joint of the other side; None: found by place and motion.
+    """
     rotations, translations = split_motions(motions, positions)
     others = np.zeros(0, np.uint32) if mirrored is None else mirrored.astype(np.uint32)
     return _native.GivenJoints(positions, rotations, translations, others)
 
 
 def _settings(options: FitOptions | None, pivots: Sequence[Pivot] = ()) -> _native.FitSettings:
-    """The native form of the options; both have fields of the same names."""
+    """The options as an object of the native module, whose fields have the same names."""
     settings = _native.FitSettings()
     for name, value in asdict(options or FitOptions()).items():
         setattr(settings, name, value)
@@ -209,7 +216,8 @@ def _settings(options: FitOptions | None, pivots: Sequence[Pivot] = ()) -> _nati
 
 
 def _weights(dense: Doubles) -> _native.FitWeights:
-    """The native form of dense weights float64[V, J]: each row without its zeros."""
+    """Dense weights float64[V, J] as an object of the native module, which stores only the weights
+    above 0."""
     return _native.FitWeights(*_rows(dense))
 
 

@@ -51,7 +51,8 @@ from .work import (
     resting,
 )
 
-# Finished fraction at the ends of the preparation, of the fit and of the meshes.
+# Finished fraction of the work after the preparation, after the fit of the joints, and after making
+# the meshes.
 _BEGUN, _FIT, _MESHES = 0.1, 0.7, 0.8
 _SOLVED = 0.6  # finished fraction of the work on correctives once joint values are solved
 _EMPTY = 2.0  # groups by region may have this factor more coefficients than groups by drivers
@@ -210,7 +211,7 @@ def _made(
         dna: the face of shapes.
         o: options of the rig.
         progress: gets the finished fraction.
-        like: reference to reuse, or None.
+        like: reference whose joints and weights are reused, or None.
         whole: whether meshes get blend shapes and errors are measured.
 
     Returns: the face with quantities computed from it, the joints, the meshes, names of joints by
@@ -265,15 +266,16 @@ def _made(
 
 
 def _take_chosen(work: Work, other: Work) -> None:
-    """Copy to `work` the parents, pivots, mirrored joints, heirs and the joints of each LOD, which
-    were chosen in `other`, the face with simplified meshes."""
+    """Copy quantities that were chosen in `other`, the face with simplified meshes, to `work`: the
+    parents, pivots and mirrored joints, the joints of each LOD, and heirs (for each joint that a
+    LOD lacks, the joint that takes its vertices)."""
     work.parents, work.new, work.pivots = other.parents, other.new, other.pivots
     work.mirrored, work.heirs = other.mirrored, other.heirs
 
 
 def _counting(progress: Progress | None, least: int) -> Callable[[], None]:
     """A function that passes a finished fraction to `progress`, and raises DnaError if `progress`
-    returns False. The fraction grows with each call and approaches _BEGUN.
+    returns False. The fraction grows with each call and approaches _BEGUN (0.1).
 
     Args:
         progress: gets the finished fraction.
@@ -306,8 +308,9 @@ def _new_joints(
     options: RigOptions,
     progress: Progress | None,
 ) -> tuple[Joints, dict[int, Doubles]]:
-    """Fit joints and dense weights of the meshes of LOD 0. Sets pivots, parents, new, mirrored and
-    heirs in `work`."""
+    """Fit joints and dense weights of the meshes of LOD 0. Sets five attributes of `work`: pivots,
+    parents, new (the new joints of each LOD), mirrored (the joint of the other side), and heirs
+    (for each joint that a LOD lacks, the joint that takes its vertices)."""
     room = room_for_second(work, shaped, wanted, options.fit.joints)
     own = replace(options.fit, joints=options.fit.joints - room)
     jaw = _jaw(work)
@@ -386,13 +389,15 @@ def _part(progress: Progress | None, begin: float, end: float) -> Progress | Non
 def _order_levels(
     work: Work, shaped: Sequence[int], fit: Joints, weights: dict[int, Doubles], o: RigOptions
 ) -> None:
-    """Choose the new joints of each LOD. Sets new, mirrored and heirs in `work`.
+    """Choose the new joints of each LOD. Sets three attributes of `work`: new (the new joints of
+    each LOD), mirrored (the joint of the other side), and heirs (for each joint that a LOD lacks,
+    the joint that takes its vertices).
 
     Args:
         work: the face.
         shaped: indices of the fitted meshes.
         fit: the joints.
-        weights: mesh -> float64[V, joints].
+        weights: index of a mesh -> float64[V, joints], skin weights of the mesh.
         o: options of the rig, with the number of joints of each LOD.
     """
     used = given(work)
@@ -402,7 +407,7 @@ def _order_levels(
     mirrored = fit.mirrored
     place = np.concatenate([used, own])
     # Shifts of joints that no expression moves, such as the neck, count as further expressions, so
-    # that vertices keep following the same of these joints.
+    # that each vertex keeps following the joint that it follows in the source.
     carried = carried_shifts(work, resting(work))[:, place]
     order, heirs = joint_order(
         joined_positions(work, shaped),
@@ -444,7 +449,7 @@ def _fit(
     Args:
         work: the face.
         meshes: indices of the meshes.
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         jaw: index of the joint that opens the mouth, or None.
         options: options of the fit.
         progress: gets the finished fraction of the fit.

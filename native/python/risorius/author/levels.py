@@ -38,7 +38,8 @@ class LodOptions:
 
     count: int = 8
     joints: tuple[int, ...] = ()  # new joints of each level; empty: fractions of LOD 0's number
-    # Vertices of each LOD; empty: 0.6 times the vertices of the finer LOD, at most 60,000.
+    # Number of vertices of each LOD; empty: a LOD has 0.6 times the vertices of the next finer LOD,
+    # but at most 60,000.
     vertices: tuple[int, ...] = ()
 
     def check(self) -> None:

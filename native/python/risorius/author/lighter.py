@@ -22,7 +22,7 @@ class Lightened:
     before: int  # number of deltas of the input at LOD 0
     after: int  # number of deltas of the face at LOD 0
     shortest_mm: float = 0.0  # length of the longest removed delta at LOD 0; 0: none removed
-    # (mesh, channel) -> length of the longest removed delta, mm
+    # (name of a mesh, channel) -> length of the longest removed delta in mm
     dropped: dict[tuple[str, int], float] = field(default_factory=dict)
 
 

@@ -57,7 +57,7 @@ class Made:
             options: options of the rig.
             weights: mesh -> float64[V, joints] of the finest meshes, or of their simplified meshes.
             coarse: triangles of the coarser LODs.
-            like: reference to reuse, or None.
+            like: reference whose joints and weights are reused, or None.
             whole: whether to make blend shapes and measure errors.
             fewer: the simplified meshes to which the joints were fitted, or None.
             go_on: called before each mesh and each block; raises an error to stop.
@@ -256,7 +256,7 @@ class Made:
         self.errors.append(left)
 
     def finish(self) -> None:
-        """Store the meshes in the Dna."""
+        """Store the finished meshes of all LODs in the face of joints."""
         dna = self.work.dna
         dna.meshes, dna.mesh_names, dna.lod_mesh_mapping = self.meshes, self.names, self.listed
         dna.mesh_blend_shape_channel_mapping = np.array(

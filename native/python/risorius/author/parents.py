@@ -51,7 +51,7 @@ def choose_parents(
         work: the face.
         meshes: indices of the fitted meshes.
         fit: the joints.
-        weights: mesh -> float64[V, joints].
+        weights: index of a mesh -> float64[V, joints], skin weights of the mesh.
         jaw: the joint that opens the mouth, or None.
     """
     first = len(given(work))
@@ -81,7 +81,7 @@ def room_for_second(
     Args:
         work: the face.
         meshes: indices of the meshes to fit.
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         joints: number of all new joints.
     """
     for m in meshes:
@@ -108,7 +108,7 @@ def second_joints(
         work: the face; the parents of new joints must be known.
         meshes: indices of the fitted meshes.
         fit: the joints.
-        weights: mesh -> float64[V, joints].
+        weights: index of a mesh -> float64[V, joints], skin weights of the mesh.
         room: largest number of second joints.
 
     Returns:
@@ -144,7 +144,7 @@ def _split(
     Args:
         work: the face.
         fit: the joints.
-        weights: mesh -> float64[V, joints].
+        weights: index of a mesh -> float64[V, joints], skin weights of the mesh.
         shares: mesh -> float64[V, resting joints], result of carried_shares().
         split: for each second joint, the index of its first joint among the new joints, and the
             index of its parent among the joints that no expression moves.

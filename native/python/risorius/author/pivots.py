@@ -46,7 +46,7 @@ def find_pivots(
         positions: float64[V, 3], neutral vertices.
         displacements: float64[E, V, 3], displacements with each expression at 1.
         joint_names: names of the existing joints.
-        joints: float64[J, 3], their positions.
+        joints: float64[J, 3], positions of the existing joints.
         jaw: whether an existing joint opens the mouth; then no hinge is needed.
     """
     out = []

@@ -209,7 +209,7 @@ def refit(
         work: the other face; gets the LODs and the joint parents of the reference.
         reference: the reference; check() has accepted the face.
         shaped: indices of the meshes to fit.
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         options: options of the fit.
 
     Returns: the joints, and mesh -> weights float64[V, joints] of the finest meshes.

@@ -21,8 +21,9 @@ from .levels import LodOptions
 from .pivots import Pivot
 
 MM = {"cm": 10.0, "m": 1000.0}
-# Shift in mm of an unmoved joint in carried_shifts(). A vertex that follows another neck joint than
-# in the source gets this error, because a rotated head separates such vertices about this far.
+# Shift in mm of a joint in carried_shifts(), one of the joints that no expression moves. A vertex
+# that follows another neck joint than in the source has this error, because a rotation of the head
+# moves the vertex about this far from its right position.
 CARRIED_MM = 20.0
 # Largest memory of making a rig: a constant plus a factor times the file's size. The dense table of
 # all expressions is about a hundred times as large as the deltas in the file.
@@ -38,8 +39,8 @@ class RigOptions:
     """Options of a joint rig."""
 
     fit: FitOptions = field(default_factory=FitOptions)
-    # Blend shapes correct a vertex if the joints' error exceeds this, in mm. None: the limit is
-    # `tolerance` times the head's height.
+    # Largest error in mm that the joints may leave at a vertex; blend shapes correct larger errors.
+    # None: `tolerance` times the height of the head.
     tolerance_mm: float | None = None
     tolerance: float = TOLERANCE
     shapes: bool = True  # False: joints only, no blend shapes
@@ -56,9 +57,9 @@ class RigOptions:
     # Whether errors at control values between 0 and 1 are measured, which takes a tenth of the
     # total time.
     between: bool = True
-    # Joints are fitted to meshes of about this number of vertices together: larger meshes are
-    # simplified for the fit. Then weights are transferred to all vertices, and blend shapes are
-    # made for the errors there.
+    # Joints are fitted to meshes that have about this number of vertices together; larger meshes
+    # are simplified for the fit. Then the weights are transferred to all vertices of the whole
+    # meshes, and blend shapes correct the errors that remain.
     fit_vertices: int = LARGE
 
 
@@ -175,7 +176,7 @@ def require_sizes(dna: Dna) -> None:
 
     Raises:
         ArgumentError: the face has no mesh, no mesh has vertices at different places, or a
-            coordinate is infinite, NaN, or so large (above FARTHEST) that its square could
+            coordinate is infinite, NaN, or so large (above 1e9) that its square could
             overflow.
     """
     if not dna.meshes:
@@ -200,7 +201,7 @@ def _check_size(dna: Dna, count: int, together: Container[int]) -> None:
 
     Args:
         dna: the face.
-        count: number of its inputs.
+        count: number of inputs of the face.
         together: inputs that are correctives.
 
     Raises:
@@ -210,7 +211,8 @@ def _check_size(dna: Dna, count: int, together: Container[int]) -> None:
     joints, vertices = len(dna.joint_names), [len(mesh.positions) for mesh in dna.meshes]
     numbers = 9 + 3 * 16  # attributes of a joint, and three matrices for its world transform
     budget.hold(8 * numbers * count * joints, f"{joints:,} joints that {count:,} inputs move")
-    # Large meshes are worked on in blocks.
+    # A mesh of more than LARGE vertices is processed in blocks, so the tables have the size of a
+    # block.
     vertices = [min(count, LARGE) for count in vertices]
     budget.hold(8 * joints * max(vertices), f"weights of {joints:,} joints")
     alone = sum(column not in together for column in range(count))
@@ -285,8 +287,9 @@ def carriers(work: Work) -> Ints:
 def carried_shares(work: Work, mesh: Mesh) -> Doubles:
     """float64[V, n]: the fraction of a vertex' weights that each of the n joints of resting() has.
 
-    The fraction is the sum of the weights on the joints whose carriers() is this joint. Rows have
-    the sum 1, or 0 for a vertex without weights.
+    The weight of any other joint counts for the joint of resting() that carriers() gives for it:
+    its nearest ancestor that no expression moves. Rows have the sum 1, or 0 for a vertex without
+    weights.
 
     Args:
         work: the face.
@@ -299,20 +302,20 @@ def carried_shares(work: Work, mesh: Mesh) -> Doubles:
 
 
 def carried_shift(work: Work) -> float:
-    """CARRIED_MM in the file's unit: the shift of unmoved joints in carried_shifts()."""
+    """The length of the shift in carried_shifts(), CARRIED_MM (20 mm), in the file's unit."""
     return CARRIED_MM / MM.get(work.source.translation_unit, 10.0)
 
 
 def carried_shifts(work: Work, joints: Ints) -> Doubles:
     """float64[n, joints, 3]: shifts of all joints if one of n joints is shifted upwards by
-    CARRIED_MM.
+    CARRIED_MM (20 mm), in the file's unit.
 
     The fits use these shifts as additional expressions, so that vertices keep following the same
     joint of neck and head.
 
     Args:
         work: the face; the parents of new joints must be known.
-        joints: n joints that no expression moves, see resting().
+        joints: indices of n joints that no expression moves; resting() lists all such joints.
     """
     out = np.zeros((len(joints), len(work.source.joint_names) + len(work.parents), 3))
     out[..., 1] = carried_shift(work) * (carriers(work) == np.asarray(joints)[:, None])
@@ -335,7 +338,7 @@ def new_weights(work: Work, meshes: Sequence[int], weights: dict[int, Doubles]) 
     Args:
         work: the face.
         meshes: indices of the meshes.
-        weights: mesh -> float64[V, joints].
+        weights: index of a mesh -> float64[V, joints], skin weights of the mesh.
     """
     return np.concatenate([weights[m][:, len(work.source.joint_names) :] for m in meshes])
 

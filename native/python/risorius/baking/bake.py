@@ -46,14 +46,15 @@ def bake(
         lod: the LOD, from 0.
         outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty to write no file.
             Temporary files of killed processes in these folders are not deleted.
-        parts: pose parts to write, some of PARTS.
+        parts: parts of the pose to write: some of "joints", "shapes", "maps" and "controls".
         compress: True: the .npz is smaller, but writing it takes several times longer.
         threads: number of threads; 0: all cores.
         progress: called with the number of finished frames.
 
     Returns:
         The facts of Measure, such as the largest joint translation, and "evaluation_seconds", the
-        time inside the evaluator; a .csv needs an earlier evaluation, which does not count.
+        time inside the evaluator. For a .csv all frames are evaluated twice; the time of the first
+        evaluation does not count.
 
     Raises:
         ValueError: the character lacks this LOD.

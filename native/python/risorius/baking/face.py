@@ -63,10 +63,10 @@ class Face:
         return ("tx", "ty", "tz", *turn, "sx", "sy", "sz")
 
     def rest(self, part: str) -> Floats:
-        """The rest values of a part of the pose, one of PARTS.
+        """The rest values of a part of the pose: "joints", "shapes", "maps" or "controls".
 
-        The part "joints" has float32[joints, columns], the difference from the neutral joint: 0,
-        but 1 for qw. Other parts have float32[n], one per name.
+        The part "joints" has float32[joints, columns], the differences from the neutral pose: 0 in
+        all columns except qw, which has 1. Any other part has float32[n], one value per name.
         """
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
@@ -166,13 +166,13 @@ def prepared(
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
     """Add curves of the raw controls that rotate the neck and head joints of a face.
 
-    The rotations are computed from the clip's curves of ANGLES: yaw, pitch and roll of neck and
-    head in radians. Neck joints get no curves
-    if the clip has no neck angles, and head joints get none if it has no head angles. A joint also
-    gets no curves if the clip already has a curve of one of its raw controls.
+    The rotations are computed from the clip's curves of angles, such as head.yaw: yaw, pitch and
+    roll of neck and head in radians. Neck joints get no curves if the clip has no neck angles, and
+    head joints get none if it has no head angles. A joint also gets no curves if the clip already
+    has a curve of one of the joint's raw controls.
 
     Args:
-        clip: a clip with or without curves of ANGLES.
+        clip: a clip with or without curves of these angles.
         face: the character.
 
     Returns:
@@ -202,8 +202,9 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of curves of `clip` that have no effect on `face`: they are neither raw controls of
-    it nor angles of a bone that it rotates by raw controls."""
+    """The names of curves of `clip` that have no effect on `face`. A curve has an effect if it is a
+    raw control of the face, or an angle of the neck or of the head, such as head.yaw, for which raw
+    controls of the face rotate joints."""
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))

@@ -44,7 +44,7 @@ class NpzWriter:
             file: binary file, open for writing.
             beside: arrays that do not depend on frames, from about().
             face: the character, from `load_face`.
-            parts: parts to write, from PARTS.
+            parts: parts of the pose to write, such as "joints".
             compress: True for a smaller file.
         """
         self._beside = beside
@@ -123,7 +123,7 @@ def about(
         clip: the baked clip.
         face: the character, from `load_face`.
         lod: the baked LOD, from 0.
-        parts: baked parts, from PARTS; their names are included.
+        parts: parts of the pose that are baked, such as "joints"; the arrays contain their names.
 
     Returns:
         Name in the .npz -> array; times are in seconds.
@@ -162,7 +162,7 @@ def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> di
     Args:
         face: the character, from `load_face`.
         chunks: poses of all frames.
-        parts: parts to examine, from PARTS.
+        parts: parts of the pose to examine, such as "joints".
 
     Returns:
         Part -> int64[moving], indices of these components in the flattened array face.rest(part).

@@ -164,7 +164,7 @@ def checked(name: str, check: Callable[..., T], value: object, low: float, high:
         high: largest allowed value.
 
     Raises:
-        ArgumentError: not such a number, or out of range; the error names the argument.
+        ArgumentError: `check` refuses the value; the error names the argument.
     """
     try:
         return check(value, low, high)
@@ -173,7 +173,8 @@ def checked(name: str, check: Callable[..., T], value: object, low: float, high:
 
 
 def shown(value: object) -> str:
-    """A value as text for errors, shortened if it is long; only "a list" or "a table" for these.
+    """A value as text for errors, shortened if it is long. The text is "a list" for any list, and
+    "a table" for any table.
 
     Args:
         value: a value of any type.

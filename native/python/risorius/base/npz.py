@@ -41,7 +41,7 @@ def hold_arrays(file: BinaryIO) -> None:
 
     Raises:
         BudgetError: the arrays are too large in proportion to the file.
-        BadZipFile and others of DAMAGED: not a valid .npz.
+        BadZipFile or another exception in DAMAGED: the file is not a valid .npz.
     """
     with zipfile.ZipFile(file) as members:
         budget = Budget.of(file.seek(0, 2))

@@ -64,7 +64,8 @@ def open_file(path: str | os.PathLike[str]) -> BufferedReader:
         path: path of the file.
 
     Raises:
-        ReadingError: the file is a character device, which has no end, and no terminal.
+        ReadingError: the file is a character device other than a terminal; such a device may have
+            no end.
         OSError: the file cannot be read.
     """
     file = open(path, "rb")  # noqa: SIM115  the caller closes it

@@ -76,7 +76,7 @@ _BYTES = (
     (b"RZC\x1a", 0,
      Kind("rzc", "a clip of Risorius (.rzc)", "if its name ends otherwise, rename it")),
 )  # fmt: skip
-# Names inside ZIP archives that identify documents.
+# Names of files inside a ZIP archive that show the kind of the document.
 _INSIDE = (
     (b"xl/workbook", _EXCEL),
     (b"word/document", _WORD),
@@ -126,7 +126,7 @@ def other_kind(data: bytes, own: Container[str] = ()) -> Kind | None:
     """The kind of a file, unless the reader accepts that kind.
 
     Args:
-        data: bytes as for `kind_of`.
+        data: bytes of the file, or the result of `ends_of`.
         own: codes of the kinds that the reader accepts.
     """
     kind = kind_of(data)

@@ -13,8 +13,8 @@ from .errors import ArgumentError, RisoriusError
 
 MOST_BYTES = reading.TEXT
 DEEPEST = 64
-# Finds dotted keys of more than DEEPEST parts. Such keys are refused, because the parser's time
-# grows with the square of the number of parts.
+# Finds dotted keys of more than DEEPEST (64) parts. Such keys are refused, because the time of the
+# parser grows with the square of the number of parts.
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 
 
@@ -31,7 +31,8 @@ def parse(text: str) -> dict[str, Any]:
         text: the text.
 
     Raises:
-        TomlError: not TOML, more than MOST_BYTES characters, or nested deeper than DEEPEST.
+        TomlError: the text is not TOML, has more than MOST_BYTES (16 Mi) characters, or is nested
+            deeper than DEEPEST (64) levels.
     """
     if len(text) > MOST_BYTES:
         raise TomlError(f"at most {MOST_BYTES:,} characters were expected, found {len(text):,}")
@@ -70,7 +71,7 @@ def text_of(path: str | os.PathLike[str]) -> str:
 
     Raises:
         TomlError: the file is not UTF-8; the error's text does not name the file.
-        ReadingError: the file is larger than MOST_BYTES, or a device.
+        ReadingError: the file is larger than MOST_BYTES (16 MiB), or a device.
         OSError: the file cannot be read.
     """
     try:

@@ -42,12 +42,13 @@ class Options:
     """Options that change the content of the outputs.
 
     Attributes:
-        parts: parts of the pose to write, from PARTS.
-        rate: frames per second to resample to; None: as in the clip.
+        parts: parts of the pose to write: some of "joints", "shapes", "maps" and "controls".
+        rate: frames per second to resample to; None: the rate of the clip.
         frames: first and end (exclusive) of the frames after resampling; None: to the clip's end.
         quaternions: True: rotations of joints are quaternions; False: Euler angles.
         compress: True: the .npz is compressed.
-        mapping: the mapping of curves to controls.
+        mapping: name of the built-in mapping of curves to controls, or path of its TOML file;
+            None: the mapping that fits a clip best.
     """
 
     parts: tuple[str, ...] = DEFAULT_PARTS

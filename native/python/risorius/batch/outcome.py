@@ -15,8 +15,8 @@ class Outcome:
         name: name of the job.
         error: the reason of the failure; "" if it succeeded.
         stamp: hash of everything that the outputs depend on, from work.stamp; "" after a failure.
-        facts: results of baking.bake, the mapping and the curves it left out, and the seconds for
-            loading and for the whole job.
+        facts: the results of baking.bake, the name of the mapping, the curves that the mapping left
+            out, the seconds for loading, and the seconds for the whole job.
         attempts: number of processes of this run that got the job; 1 on a cluster.
     """
 

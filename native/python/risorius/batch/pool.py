@@ -157,7 +157,7 @@ class Pool:
         Closing the iterator early, even by an exception, stops the workers.
 
         Raises:
-            PoolError: workers end again and again before they have begun.
+            PoolError: worker processes end again and again before they are ready for a job.
             OSError: the system cannot start a process.
         """
         queue, left = _Queue(jobs), len(jobs)
@@ -211,8 +211,8 @@ class Pool:
         self._workers.append(_Worker(self._work))
 
     def _stop(self) -> None:
-        """Stop all workers, immediately if they have jobs or have not begun; the caller deletes
-        partial files."""
+        """Stop all workers. A worker that runs a job, or that is not yet ready for one, is killed;
+        the caller must delete its partial files."""
         for worker in self._workers:
             worker.connection.close()
             if worker.job is not None or not worker.ready:

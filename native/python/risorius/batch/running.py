@@ -49,7 +49,7 @@ class Report:
         return [outcome for outcome in out if outcome and outcome.error]
 
     def facts(self) -> dict[str, Any]:
-        """The result as plain values, for JSON."""
+        """The result of the batch as plain values, which json.dumps accepts."""
         failed = self.failed()
         return {
             "jobs": len(self.plan.jobs),
@@ -92,7 +92,8 @@ def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool
 
     Raises:
         LockedError: another batch works in the output folder.
-        PoolError: workers end before they begin, or the cluster cannot be reached or is gone.
+        PoolError: worker processes end before they are ready for a job, or the cluster does not
+            answer.
         OSError: the output folder cannot be written.
         KeyboardInterrupt: the workers were stopped; finished jobs are in the journal.
     """
@@ -128,7 +129,8 @@ def _run(plan: Plan, workers: int | None, scheduler: str | None, restart: bool) 
 def _results(
     jobs: Sequence[Job], workers: int | None, scheduler: str | None, progress: Progress
 ) -> Generator[Outcome, None, None]:
-    """Run jobs in local processes or on a cluster."""
+    """Run jobs in processes of this machine or on a cluster, and yield their outcomes as they
+    arrive."""
     if not jobs:
         return
     if scheduler is None:

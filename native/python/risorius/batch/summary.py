@@ -28,7 +28,8 @@ Rows = Iterator[dict[str, Any]]
 
 
 def rows(plan: Plan, outcomes: Mapping[str, Outcome], reused: set[str], journal: Journal) -> Rows:
-    """A row per job in the plan's order; its state is done, kept, failed or not done.
+    """A row for each job, in the order of the plan. The state of a job is "done" (by this run),
+    "kept" (an earlier run finished it), "failed" or "not done".
 
     Args:
         plan: all jobs.

@@ -41,7 +41,8 @@ class Kept(Generic[_Value]):
         self._values: OrderedDict[object, _Value] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], _Value]) -> _Value:
-        """The value of a key; a value that the cache lacks is made while other threads wait.
+        """The value of a key. A value that the cache lacks is made; until it is made, all
+        other threads that use this cache wait.
 
         Args:
             key: key of the value; hashable.
@@ -112,7 +113,8 @@ def _performance(job: Job) -> Performance:
 
 
 def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
-    """Run a job; OSError, ValueError and MemoryError become an Outcome, other errors are raised.
+    """Run a job. An OSError, ValueError or MemoryError gives an Outcome with the text of the error;
+    other errors are raised.
 
     Args:
         job: job whose paths exist on this machine.

@@ -61,7 +61,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def program() -> Path | None:
-    """The benchmark program in this Python's scripts folder or on PATH, or None; wheels lack it."""
+    """The path of the benchmark program rig_bench, in the scripts folder of this Python or in a
+    folder of the environment variable PATH. None if it is not installed; wheels do not contain
+    it."""
     places = [sysconfig.get_path("scripts"), *os.get_exec_path()]
     found = shutil.which("rig_bench", path=os.pathsep.join(places))
     return Path(found) if found else None
@@ -76,7 +78,8 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
         folder: folder for the files.
 
     Returns:
-        Paths of the files, one of float32 per array, in the order of FRAMES.
+        Paths of three files with float32 numbers, one file for each array: frames with 20, 60 and
+        260 active controls, in this order.
 
     Raises:
         InputError: not an .npz, or an array is missing, has a wrong shape or fewer than 2 frames.

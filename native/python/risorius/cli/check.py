@@ -85,7 +85,7 @@ def _joint_controls(dna: risorius.Dna) -> list[risorius.Finding]:
 
 
 def examine(name: str, strict: bool) -> dict[str, Any]:
-    """All results for one file, as plain values.
+    """The results of `risorius check` for one file, as plain values.
 
     Args:
         name: name of the file; *.json is read as JSON, other names as DNA.
@@ -124,8 +124,8 @@ def lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _mixes(everything: list[dict[str, Any]], *, quiet: bool) -> None:
-    """Add to each valid file's results whether its face can be mixed with the first valid one, and
-    print this unless `quiet`. A face that cannot be mixed is not ok."""
+    """Add to the results of each valid file whether its face can be mixed with the face of the
+    first valid file, and print this unless `quiet`. A file whose face cannot be mixed is not ok."""
     sound = [facts for facts in everything if facts["ok"]]
     first = risorius.load(sound[0]["file"]) if sound else None
     for facts in sound[1:]:

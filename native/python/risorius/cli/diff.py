@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius info --diff: the differences between two files, in words."""
+"""risorius info --diff: prints the differences between two files in words."""
 
 from __future__ import annotations
 

@@ -154,7 +154,7 @@ def shortest(value: np.float32) -> float:
 
 
 def describe(dna: risorius.Dna, rig: risorius.Rig, raw: Floats, lod: int) -> dict[str, Any]:
-    """All results for one pose, as plain values.
+    """All facts about a pose that `risorius eval` prints, as plain values.
 
     Args:
         dna: the face.
@@ -186,7 +186,7 @@ def _moved(value: float) -> bool:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The results as text."""
+    """The result of describe() as text."""
     width = max(
         [len(row["name"]) for rows in facts.values() if isinstance(rows, list)
          for row in rows if isinstance(row, dict)],

@@ -74,7 +74,8 @@ def parse_frames(text: str) -> tuple[int | None, int | None]:
 
 
 def parse_parts(texts: list[str]) -> tuple[str, ...]:
-    """Check the names of the pose parts that are to be written, and sort them as in PARTS.
+    """Check the names of the pose parts that are to be written, and sort them in the order joints,
+    shapes, maps, controls.
 
     Raises: ValueError: a part is unknown or repeated, or no part is named.
     """
@@ -118,7 +119,7 @@ def _target(args: argparse.Namespace) -> tuple[str, Path]:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The results as one line of text."""
+    """The facts about an evaluated clip as one line of text."""
     move = f"{facts['largest_move']:.4g} {facts['translation_unit']}"
     joint = facts["largest_move_joint"]
     where = f" ({joint}, frame {facts['largest_move_frame']})" if joint else ""

@@ -23,7 +23,8 @@ KINDS = ("dna", "json")
 class InputError(RisoriusError):
     """Unusable input; the text is one line with the file and the place.
 
-    offset: byte offset of the fault, if known and if no DnaError is the cause.
+    If the byte offset of the fault is known, the attribute `offset` has it, except if a DnaError is
+    the cause.
     """
 
     code = "input"

@@ -38,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def describe(dna: risorius.Dna) -> dict[str, Any]:
-    """All results of the command, as plain values."""
+    """All facts about a face that `risorius info` prints, as plain values."""
     lods = []
     for lod in range(dna.lod_count):
         rows = [int(g.lods[lod]) for g in dna.joint_groups if len(g.lods) > lod]
@@ -122,7 +122,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The results as text."""
+    """The result of describe() as text."""
     signs = "".join("+" if s > 0 else "-" for s in facts["rotation_signs"])
     out = [
         f"{facts['name'] or '(no name)'}: DNA {facts['file_version']}, {facts['archetype']}, "

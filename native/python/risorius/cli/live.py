@@ -151,7 +151,8 @@ def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
 
 
 def _place(receiver: Receiver) -> str:
-    """The address that the user types into the app, and which machines can connect."""
+    """A text with the address that the user types into the app, and with the machines that can
+    connect to it."""
     if receiver.host == THIS_MACHINE:
         return f"this machine alone at port {receiver.port}; --everywhere for a phone"
     address = own_address() or "this machine's address"

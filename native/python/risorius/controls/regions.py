@@ -31,7 +31,7 @@ def short_name(control: str) -> str:
 
 
 def region_of(control: str, *, by_last_part: bool = False) -> str:
-    """The face region of a control, one of REGIONS.
+    """The face region of a control, such as "mouth"; regions.toml lists the regions.
 
     Args:
         control: name of the control.

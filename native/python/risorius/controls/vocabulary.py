@@ -262,8 +262,14 @@ def _meaning(vocabulary: str, name: str, value: Any) -> Meaning:
 
 
 def _controls_of(key: str, share: float, units: dict[str, float]) -> dict[str, float]:
-    """Control -> weight for one entry of a meaning. ARKit units of the entry are added to
-    `units`."""
+    """Full name of a control -> weight, for one entry of a meaning.
+
+    Args:
+        key: the entry: a control without prefix, "=" and an ARKit unit, or "@" and an expression,
+            which gives no controls.
+        share: weight of the entry.
+        units: receives the ARKit units of the entry with their weights.
+    """
     if key.startswith("@"):
         return {}
     if not key.startswith("="):

@@ -123,10 +123,11 @@ def explain_correctives(
     """The correctives in groups.
 
     Returns:
-        "count": the number of correctives. "fire": active ones. "lack_one": inactive ones of
-        several controls, of which exactly one is not above 0, if something reads them at this LOD.
-        "rest_at_this_lod": ones that are inactive although all their controls are above 0, because
-        nothing reads them at this LOD or because they depend on themselves.
+        "count": the number of correctives. "fire": the active correctives. "lack_one": the inactive
+        correctives of several controls of which exactly one is not above 0, if something reads the
+        corrective at this LOD. "rest_at_this_lod": correctives that are inactive although all their
+        controls are above 0, because nothing reads them at this LOD or because they depend on
+        themselves.
 
     Args:
         dna: the face.

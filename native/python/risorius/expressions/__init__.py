@@ -67,8 +67,8 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
 
     Args:
         path: a TOML file, or a folder of TOML files (a library), read in the order of their names;
-            None: Risorius' own expressions, in the order of FILES. If several files have a name,
-            the last one is used, with a warning.
+            None: Risorius' own expressions (emotions, visemes, faces). If several files contain an
+            expression of the same name, the last file is used, with a warning.
 
     Raises:
         ValueError: an invalid file; the message names the file, the expression, the value found and

@@ -52,7 +52,7 @@ def jpeg(pixels: Pixels, quality: int = 85, *, fine_color: bool = False) -> byte
     Args:
         pixels: uint8[h, w] or [h, w, 3], sides from 1 to 65535; row 0 is the bottom (v = 0), as in
             files.png.
-        quality: 1 to 100, as in other programs.
+        quality: 1 to 100, on the usual scale of JPEG programs; 100 is the best.
         fine_color: True: store the colour of each pixel, as normal maps need; False: one colour for
             2 by 2 pixels.
     """

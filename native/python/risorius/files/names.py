@@ -33,7 +33,7 @@ def file_name(name: str, ending: str = "", taken: Iterable[str] = ()) -> str:
             if needed.
 
     Returns:
-        A file name without a folder, at most LONGEST bytes long.
+        A file name without a folder, at most LONGEST (200) bytes long in UTF-8.
     """
     text = "".join("_" if c in _FORBIDDEN or not c.isprintable() else c for c in name)
     text = text.lstrip(" .")
@@ -65,7 +65,8 @@ def folded(path: str) -> str:
 
 
 def _cut(text: str, ending: str) -> str:
-    """Join a text and an ending, with the text shortened to fit LONGEST."""
+    """Join a text and an ending. The text is shortened so that the result has at most LONGEST (200)
+    bytes."""
     room = LONGEST - len(ending.encode()) - 1  # one byte for the "_" before a device name
     text = text.encode()[:room].decode(errors="ignore").rstrip(" .") or UNNAMED
     device = text.partition(".")[0].rstrip().casefold() in _DEVICES

@@ -53,9 +53,10 @@ class Combination:
     Attributes:
         name: name of its morph target.
         of: names of the targets that drive it.
-        weight: formula of its weight, one of the constants PRODUCT to SHUT of this file.
+        weight: name of the formula of its weight, such as "product" for the product of the
+            weights of two targets.
         error_mm: largest deviation of the linear sum from the rig in mm, without this combination;
-            0 if it was not measured, as for the combinations of Refiner.
+            0 if it was not measured, as for the combinations that Refiner adds.
     """
 
     name: str

@@ -169,7 +169,8 @@ def _lower(wishes: Wishes, levels: int) -> Iterator[Wishes]:
 
 
 def _lowered(before: Wishes, after: Wishes) -> Iterator[str]:
-    """The names of the reduced options."""
+    """The names, for a note to the user, of the options that were reduced from `before` to
+    `after`."""
     if after.sparse != before.sparse:
         yield "sparse targets"
     if after.textures != before.textures:
@@ -185,7 +186,8 @@ def _megabytes(written: Written) -> str:
 
 
 class _Maker:
-    """Makes the file of a face once per set of options; reuses results that stay the same."""
+    """Makes the exported file of a face for different sets of options; reuses the parts that do not
+    depend on the changed options."""
 
     def __init__(self, dna: Dna, rig: Rig, file: Path, targets: Sequence[Target]) -> None:
         self._dna, self._rig, self._targets = dna, rig, targets

@@ -25,11 +25,11 @@ _LEAST_DEGREES = 1.0  # degrees: smaller turns of the eyes count as none
 
 
 def measured(points: Points, sums: Sums, targets: Mapping[str, Target]) -> Manner:
-    """Measures the VRM values of a face at one LOD.
+    """Measures the values of VRM expressions on a face, at one LOD.
 
     Args:
         points: vertices of the LOD.
-        sums: linear sums of its targets.
+        sums: linear sums of the face's morph targets.
         targets: name -> target of the group vrm.
     """
     look = {}

@@ -23,7 +23,7 @@ LARGEST = 8192
 # media types of pictures that are stored unchanged if their pixels cannot be read
 _AS_THEY_ARE = ("image/png", "image/jpeg")
 _QUALITY = {"color": 85, "normal": 88, "roughness": 75}
-# Colour and roughness of materials without a texture.
+# Kind of a mesh -> colour and roughness of its material if the mesh has no texture.
 _PLAIN = {
     "skin": ((0.72, 0.50, 0.41), 0.55), "eyes": ((0.85, 0.83, 0.80), 0.25),
     "teeth": ((0.86, 0.80, 0.70), 0.3), "tongue": ((0.60, 0.28, 0.27), 0.45),

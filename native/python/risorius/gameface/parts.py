@@ -41,8 +41,8 @@ class Part:
         uv: float64[V, 2], v from the top as in glTF.
         normals: float64[V, 3] at the rest pose.
         triangles: int64[T, 3].
-        joints, weights: int64[V, INFLUENCES], float64[V, INFLUENCES], joints of the exported
-            skeleton and their weights in steps of 1 / 255.
+        joints, weights: int64[V, 4], float64[V, 4], the joints of the exported skeleton that move
+            each vertex, and their weights in steps of 1 / 255.
     """
 
     name: str
@@ -198,7 +198,8 @@ def _own_normals(mesh: Mesh) -> Doubles:
 
 
 def _skin(mesh: Mesh, skeleton: Skeleton) -> tuple[Ints, Doubles]:
-    """The INFLUENCES strongest joints of each position, and their weights."""
+    """int64[positions, 4], float64[positions, 4]: the four joints of the exported skeleton with the
+    largest weights at each position, and these weights."""
     count = len(mesh.positions)
     width = max(INFLUENCES, len(skeleton.names))
     dense = np.zeros((count, width))

@@ -105,7 +105,7 @@ class Refiner:
         return out
 
     def _weights(self, of: Sequence[Combination], poses: Doubles) -> Doubles:
-        """float64[poses, combinations]: weights of the combinations."""
+        """float64[poses, combinations]: the weight of each combination at each pose."""
         rows = [weight_of(one.weight, *(poses[:, self._column[n]] for n in one.of)) for one in of]
         return np.array(rows).reshape(len(of), len(poses)).T
 
@@ -158,9 +158,10 @@ class Refiner:
         return out
 
     def _main_directions(self, poses: Doubles) -> Doubles:
-        """float64[poses, _MAIN]: coordinates of each pose's error along its principal components.
+        """float64[poses, at most 80]: the coordinates of each pose's error along the largest
+        principal components of the errors of all poses.
 
-        Only the _LOUDEST vertices with the largest errors are used.
+        Only the 1,200 vertices with the largest errors are used.
         """
         loud = np.zeros(len(self._points.rest))
         for pose in poses[:: max(1, len(poses) // 100)]:

@@ -29,7 +29,7 @@ class Target:
 
     Attributes:
         name: name of the target, spelled as the app for glTF faces expects.
-        group: one of GROUPS.
+        group: "arkit", "visemes", "vrm", "expressions" or "all".
         raw: float32[R], raw controls of the pose.
         base: float32[R], raw controls of the pose from which displacements are measured.
         needs: name of the target that this one acts on top of, "" for none.
@@ -48,7 +48,7 @@ def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Targe
 
     Args:
         rig: the compiled face.
-        groups: some of GROUPS, in the order of the file.
+        groups: names of groups such as "arkit", in the order in which the file gets them.
         face: name of the face in errors.
 
     Raises:
@@ -143,7 +143,7 @@ def _whole_of(unit: str) -> str:
 
 
 def _rows(group: str) -> Iterator[tuple[str, Mapping[str, float]]]:
-    """Name and control weights of each target of a group."""
+    """For each target of a group, its name, and full name of a control -> weight."""
     if group == "arkit":
         yield from arkit.mapping().items()
         return

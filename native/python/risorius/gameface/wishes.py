@@ -16,7 +16,7 @@ class Wishes:
     """Options of the glTF export.
 
     Attributes:
-        shapes: groups of targets, some of GROUPS.
+        shapes: groups of targets: some of "arkit", "visemes", "vrm", "expressions" and "all".
         lod: number of the LOD.
         skeleton: whether to write joints of root, neck, head, jaw and eyes.
         sparse: whether morph targets store only the vertices that move; without effect if `meshopt`
@@ -31,7 +31,8 @@ class Wishes:
         within: allowed deviation of sums of two targets from the rig, in mm; larger deviations are
             corrected by combinations. None: no combinations.
         frames: typical captured frames, ARKit unit -> weight: combinations are fitted to them too.
-        humanoid: one of avatar.humanoid.KINDS, which adds missing bones; "": none.
+        humanoid: "minimal" or "mixamo", a kind of humanoid whose missing bones are added; "": no
+            bones are added.
         vrm: version "1.0" or "0.x"; "": plain glTF.
         licence: licence fields of a VRM, checked by avatar.licence.
         body: glTF or VRM of a character on whose body the face is put; None: the face alone.

@@ -313,7 +313,8 @@ class _Writer:
         moved[part.rows] |= change.delta[part.rows].any(axis=1)
 
     def _places(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Positions in metres as float32, or as int16 multiples of `step` if they are quantized."""
+        """Positions as float32 in metres. If the options ask for quantized values, positions are
+        int16 multiples of the length `step` instead."""
         if not self.wishes.quantize:
             return np.ascontiguousarray(values, "<f4")
         return np.clip(np.rint(values / self.step), -_STEPS, _STEPS).astype("<i2")

@@ -22,8 +22,15 @@ class AnimationFileError(RisoriusError):
         column: int | str | None = None,
         unknown: Sequence[str] = (),
     ) -> None:
-        """Args: name: name of the file; message: one clause; line: from 1; column: from 1, or its
-        header; unknown: curves that no mapping knows, if this is the reason of the error."""
+        """Store the place of the error, and make its message.
+
+        Args:
+            name: name of the file.
+            message: one clause with the found and the expected value.
+            line: number of the line from 1; None: unknown.
+            column: number of the column from 1, or the header of the column; None: unknown.
+            unknown: curves that no mapping knows, if they are the reason of the error.
+        """
         self.name = name
         self.unknown = tuple(unknown)
         self.line = line

@@ -22,10 +22,11 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
-# Ticks per second in keyframe times; files of FBX 8000 and later use TICKS_8000.
+# Keyframe times are stored in ticks. TICKS: ticks per second in files of FBX versions below 8000.
+# TICKS_8000: ticks per second in files of version 8000 and later.
 TICKS = 46186158000
 TICKS_8000 = 141120000
-# GlobalSettings.TimeMode -> frames per second.
+# Value of the property TimeMode in the record GlobalSettings -> frames per second.
 TIME_MODES = {
     0: 30.0, 1: 120.0, 2: 100.0, 3: 60.0, 4: 50.0, 5: 48.0, 6: 30.0, 7: 30.0, 8: 30000 / 1001,
     9: 30000 / 1001, 10: 25.0, 11: 24.0, 12: 1000.0, 13: 24000 / 1001, 15: 96.0, 16: 72.0,

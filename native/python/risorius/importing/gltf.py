@@ -89,7 +89,7 @@ class Document:
             default: the number if the key is missing.
 
         Raises:
-            AnimationFileError: not such a number.
+            AnimationFileError: the value is not a whole number of 0 or more.
         """
         value = table.get(key, default)
         try:

@@ -45,10 +45,10 @@ class Reader:
 
         Args:
             value: a value of the JSON.
-            place: its name in errors.
+            place: the value's name in errors.
 
         Raises:
-            AnimationFileError: not such a number.
+            AnimationFileError: the value is not a finite number in this range.
         """
         found = math.nan
         if isinstance(value, int | float | str) and not isinstance(value, bool):
@@ -69,7 +69,8 @@ class Reader:
             has_holes: null means a missing value and becomes NaN, which `take` fills.
 
         Raises:
-            AnimationFileError: not a list, or an item that is not such a number.
+            AnimationFileError: not a list, or an item is not a finite number in the range of
+                float32.
         """
         if not isinstance(values, list):
             raise self.fail(f"a list of numbers was expected, found {_kind(values)}", place)
@@ -102,7 +103,7 @@ class Reader:
         return None
 
     def frames_a_second(self, value: object, place: str) -> float:
-        """Reads a rate from SLOWEST to FASTEST frames per second.
+        """Reads a rate from 0.01 to 1,000,000 frames per second.
 
         Args:
             value: a value of the JSON.
@@ -121,11 +122,12 @@ class Reader:
         return rate
 
     def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
-        """float64[count]: seconds of frames, from given times; without times, or if the caller's
-        unit is rows, from 0 at the rate.
+        """float64[count]: times of frames in seconds, converted from the times of the JSON. Without
+        such times, or if the user chose to count rows, the frames begin at 0 and are evenly spaced
+        at the rate.
 
         Args:
-            given: a list of times from the JSON, or None.
+            given: the list of times from the JSON, or None.
             count: number of frames.
             rate: frames per second; None: unknown.
             place: the key of the times, which may contain their unit; also their name in errors.
@@ -174,7 +176,7 @@ class Reader:
 
 
 def first_key(table: Mapping[str, object], keys: Sequence[str]) -> str | None:
-    """The first of these keys that a table has, or None.
+    """The first key in `keys` that a table has; None if it has none of them.
 
     Args:
         table: table of the JSON.

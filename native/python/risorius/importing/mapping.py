@@ -187,9 +187,9 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
     """Applies a mapping to a clip of a file's curves; the result has curves of controls.
 
     Weighted curves for the same control are summed. If several curves match one row, only the first
-    is used, and the others are listed as ignored. A control that is a share of another is divided
-    by it, then adjusted. Values stay bitwise equal if one curve moves a control with weight 1,
-    without share or adjustment.
+    is used, and the others are listed as ignored. A control that is a share of another control is
+    divided by the other control, then adjusted. Values stay bitwise equal if one curve moves a
+    control with weight 1, without share or adjustment.
 
     Args:
         mapping: the mapping.

@@ -25,7 +25,8 @@ NAME_KEYS = (
 )  # fmt: skip
 MATRIX_KEYS = ("weightMat", "frames", "weights", "values", "data", "blendshapes", "blendShapes")
 WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
-# The last columns of NeuroSync's rows, after the columns of Live Link Face.
+# Names of the last seven columns in a NeuroSync row of 68 values; the 61 columns before them are
+# the curves of Live Link Face.
 NEUROSYNC_EMOTIONS = ("Angry", "Disgusted", "Fearful", "Happy", "Neutral", "Sad", "Surprised")
 NEUROSYNC_RATE = 60.0
 KEYS_KEYS = ("Keys", "keys")
@@ -254,8 +255,8 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
         return None
     tables = [_weights(frame) for frame in frames]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # Tables with a curve's name are keyed curves or rows of a curve table, which other functions
-    # read.
+    # Tables with the name of a curve are no frames: they are keyed curves or rows of a curve table,
+    # which keyed_curves() and curve_table() read.
     if not names or any(first_key(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
     rate = reader.rate_of(outer, outer.get("metadata"))
@@ -273,7 +274,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
 
 
 def _weights(frame: Mapping[str, Any]) -> dict[str, Any]:
-    """Curve -> value of each number in a frame, except times and frame numbers."""
+    """Name of a curve -> its value in a frame, for all numbers but times and frame numbers."""
     at = next((k for k in WEIGHT_KEYS if isinstance(frame.get(k), dict)), None)
     table = frame[at] if at else frame
     return {
@@ -295,11 +296,11 @@ def _frame_column(
 
 
 def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:
-    """The key of a time, or of a list of times; a frame number only if there is no time.
+    """The key of the time in a table, or else the key of the frame number; None if both are absent.
 
     Args:
         table: table of the JSON.
-        of_lists: whether to find a list of times instead of a single time.
+        of_lists: whether to find a list of times or frame numbers instead of a single one.
     """
     found = [
         (name.unit == FRAMES, key)
@@ -403,7 +404,8 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 def lists_by_name(reader: Reader, document: object) -> Take | None:
     """Reads {name: [values], ...} with a rate or a list of times.
 
-    The table may be nested under a key of WEIGHT_KEYS, such as "curves".
+    The table may also be the value of a key in an outer table; WEIGHT_KEYS lists the possible keys,
+    such as "curves".
 
     Returns None if the document has another layout.
 

@@ -24,7 +24,7 @@ Doubles = npt.NDArray[np.float64]
 # Smallest divisor 1 - n, where n is the neutral value of a control; a smaller divisor would only
 # amplify noise.
 LEAST_RANGE = 0.05
-# Angles that change their sign when a face is mirrored.
+# Angles of head and eyes that change their sign when a face is mirrored; pitch keeps its sign.
 _MIRRORED_ANGLES = ("yaw", "roll")
 
 
@@ -157,7 +157,8 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     budget.hold((2 * half + 1) ** 2 * 24, f"a window of {window:g} s, {2 * half + 1} frames")
     curves = clip.curves.astype(np.float64)
     low, high = curves.min(axis=1, keepdims=True), curves.max(axis=1, keepdims=True)
-    # A fit overshoots at a sharp edge, and no lid may open further than in the capture.
+    # Each curve is clamped to its old range, because the polynomial overshoots at a sharp edge, and
+    # for example a lid may not open further than in the capture.
     return clip.replaced(curves=np.clip(_savitzky_golay(curves, half, order), low, high))
 
 
@@ -191,12 +192,13 @@ def gaussian(clip: Clip, width: float) -> Clip:
 
 
 def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
-    """Smooths with a OneEuro filter, frame by frame, as the live viewer does.
+    """Smooths with a one-euro filter, frame by frame, as the live capture does.
 
     Args:
         clip: any clip.
-        cutoff: cutoff frequency of `OneEuro` at speed 0, in Hz; lower is smoother.
-        beta: increase of the cutoff with speed, Hz per (unit per second).
+        cutoff: cutoff frequency of the filter while a value does not change, in Hz; lower is
+            smoother.
+        beta: increase of the cutoff frequency with the speed of a value, Hz per (unit per second).
     """
     running = OneEuro(cutoff, beta)
     rows = [running(t, v) for t, v in zip(clip.frame_times(), clip.curves.T, strict=True)]

@@ -20,8 +20,15 @@ _USUAL = (100.0, 255.0)  # values of a full movement that files use besides 1
 
 
 def check_options(full: float | None, angles: str | None) -> None:
-    """Checks options. Raises: ArgumentError: full is not above 0 and below 1e9, or angles is not a
-    known unit."""
+    """Checks the user's options on the scale of values.
+
+    Args:
+        full: the file's value of a full movement, or None.
+        angles: the unit of the file's angles, or None.
+
+    Raises:
+        ArgumentError: full is not above 0 and below 1e9, or angles is not a known unit.
+    """
     if full is not None and not 0.0 < full < 1e9:
         raise ArgumentError(f"full_value: a number above 0 was expected, found {full}")
     if angles is not None and angles not in ANGLE_UNITS:

@@ -170,7 +170,8 @@ class Imported:
 def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
     """Keeps the requested angles of head and eyes.
 
-    Head angles that are all 0 are dropped, because their curves would only keep the head still.
+    If all head angles are 0 in all frames, they are dropped, because the capture did not record
+    them and their curves would keep the head still.
 
     Args:
         done: the mapped clip.
@@ -275,7 +276,7 @@ def read(
         found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
-    # This happens, for example, if a number in the file causes an overflow.
+    # A reader may raise these errors, for example if a number in the file causes an overflow.
     except (ValueError, ArithmeticError) as error:
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
@@ -307,7 +308,7 @@ def _read_kind(file: Path, data: bytes, options: Options) -> Take:
 
 
 def _read_mouth(text: str, name: str, options: Options) -> Take | None:
-    """Reads mouth shapes, or returns None if the text has another layout."""
+    """Reads a text of mouth shapes from a lip sync tool, or returns None for any other text."""
     if options.kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
         return visemes.read_dat(text.lstrip(), name, options.asked.rate)
     is_asked = options.kind in (None, "rhubarb", "papagayo")

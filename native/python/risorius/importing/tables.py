@@ -81,13 +81,13 @@ class Table:
         """
         text = self.rows[row][column].strip()
         if "." not in text and (self.delimiter != "," or not self.has_points):
-            # a decimal comma, which spreadsheets of many countries write
+            # The comma is a decimal comma, which spreadsheets of many countries write.
             text = text.replace(",", ".")
         return number(text, self.name, self.lines[row], self.place(column))
 
     @cached_property
     def has_points(self) -> bool:
-        """Whether numbers have decimal points.
+        """Whether any cell is a number with a decimal point.
 
         If so, a comma in a cell of a comma-separated table is not a decimal comma.
         """

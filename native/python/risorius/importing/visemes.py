@@ -30,16 +30,17 @@ BLEND = 0.12
 DAT_RATE = 24.0
 # seconds: a longer file is assumed to contain a wrong number
 LONGEST = 7200.0
-# Limit of a transition's reach into the time of each mouth shape. 1: a transition reaches at most
-# to the middle of the shape's time; 0: it may reach to the other end of that time. Viewers notice
-# if the mouth never closes for an M, but not if a D is shortened.
+# Mouth shape -> how much of its time is protected from transitions. 1: a transition reaches at most
+# to the middle of the shape's time; 0: a transition may reach to the other end of this time. For
+# example, viewers notice if the mouth never closes for an M, but not if a D is shortened.
 DOMINANCE = {
     "A": 1.0, "B": 0.3, "C": 0.5, "D": 0.7, "E": 0.6, "F": 0.8, "G": 0.9, "H": 0.5, "X": 0.3,
     "MBP": 1.0, "FV": 0.9, "U": 0.8, "WQ": 0.8, "O": 0.7, "AI": 0.7, "L": 0.5, "etc": 0.3,
     "rest": 0.3,
 }  # fmt: skip
 RHUBARB = frozenset("ABCDEFGHX")
-# Papagayo's ten mouth shapes. All names but E distinguish its files from Rhubarb's.
+# Papagayo's ten mouth shapes. All names but E distinguish Papagayo's files from Rhubarb's files,
+# which also have a shape E.
 PAPAGAYO = frozenset(("AI", "E", "etc", "FV", "L", "MBP", "O", "rest", "U", "WQ"))
 _TSV = re.compile(r"\s*(-?\d+(?:[.,]\d+)?)(?:\s+|\s*[;,|]\s*)([A-HXa-hx])\s*")
 
@@ -80,8 +81,8 @@ def flowing_curves(
     for i in range(1, len(cues)):
         border = cues[i].start
         half = min(0.5 * blend, reach[i - 1], reach[i])
-        # Frames after the end of cue i + 1 are left out, because the next transition has replaced
-        # this shape by then.
+        # The weights after the end of cue i + 1 are not changed here, because the transitions at
+        # the next borders replace this shape by then.
         beyond = cues[i + 1].end if i + 1 < len(cues) else np.inf
         first, last = np.searchsorted(times, [border - half, beyond])
         at = times[first:last]
@@ -128,7 +129,9 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Makes cues from start times; each lasts until the next. Shape `rest` precedes the first.
+    """Makes cues from start times; each cue lasts until the next one starts.
+
+    If the first cue starts after 0 s, a cue of the shape `rest` lasts from 0 s until then.
 
     Args:
         starts: (start in seconds, shape) of each cue, ascending.

@@ -90,12 +90,13 @@ class Leaving:
         held: list[tuple[Ints, Doubles]],
         importance: Doubles,
     ) -> None:
-        """Starts with all joints.
+        """Prepares the removal; no joint is removed yet.
 
         Args:
-            products: float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
+            products: float64[J, 4, J, 4]: for each pair of joints the product A^T B of their 3 x 4
+                motion matrices, summed over poses.
             points: float64[V, 4], vertices of all meshes in homogeneous coordinates.
-            held: (indices of vertices, weights) of each joint.
+            held: for each joint, the indices of its vertices and its weights for them.
             importance: float64[V], weight of a vertex's squared error.
         """
         count = len(held)
@@ -118,8 +119,9 @@ class Leaving:
             parents: int64[J]; a joint stays until all of its children are removed.
             pairs: int64[J], the mirrored joint; both are removed together if both may be removed
                 and `leaving` allows it.
-            levels: bool[J, LODs], the LODs that list a joint; its heirs are listed in these LODs
-                too, if such joints remain.
+            levels: bool[J, LODs], whether a LOD lists a joint. The heirs of a joint are chosen
+                among the remaining joints that all LODs of this joint list too, or among all
+                remaining joints if there are none.
         """
         self.levels = levels
         can = np.ones(len(parents), bool)

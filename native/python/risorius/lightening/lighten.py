@@ -81,7 +81,7 @@ class Size:
 
 @dataclass
 class ExpressionError:
-    """The error of the lighter face in one pose, over all kept LODs."""
+    """The error of the lighter face in one pose, at the kept LOD where this error is largest."""
 
     name: str  # name of the control, or names of a corrective's controls joined by +
     largest_mm: float
@@ -430,7 +430,8 @@ def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
 def _products(
     dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], counts: Doubles, middle: Doubles
 ) -> Doubles:
-    """float64[J, 4, J, 4]: products of the motions of two joints, summed over poses.
+    """float64[J, 4, J, 4]: for each pair of joints the product A^T B of their 3 x 4 motion
+    matrices, summed over poses.
 
     For each joint with children that no pose moves, a shift of the joint and its descendants by
     CARRIED_MM is added as a pose, because otherwise all joints that no pose moves would seem to be

@@ -122,7 +122,8 @@ def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -
 def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
     """Adds a channel for each input, and returns input -> index of its channel.
 
-    The rows of the new channels come first, so that all LODs with channels use them.
+    The new channels become the first rows of the face's channel table, because a LOD uses the first
+    rows of this table: so all LODs that have channels also have the new ones.
 
     Args:
         dna: the face; changed in place.

@@ -13,7 +13,8 @@ from ..author.geometry.skeleton import Doubles, Ints
 from .simplex import shares
 
 _MOST = 12  # largest number of joints per vertex, usual for such faces
-# Joints that are tried per vertex: those with the largest weights, and the nearest ones.
+# Numbers of joints that are tried per vertex: the 14 joints with the largest weights, and the 6
+# nearest joints.
 _TAKEN_OVER, _NEAR = 14, 6
 _AT_ONCE = 512  # number of vertices that are refitted together
 _EVEN = 3e-3  # strength of the pull towards the weights after the takeover, which are smooth

@@ -6,7 +6,8 @@
         ...
         clip = receiver.finish(take).clip(Shaper())
 
-packets --livelink, osc--> frames of names --Shaper--> raw controls
+The modules livelink and osc decode a packet to a frame of named values; a Shaper converts a frame
+to raw controls.
 """
 
 from __future__ import annotations

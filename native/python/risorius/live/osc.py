@@ -101,8 +101,8 @@ class Decoder:
     """Combines the messages of each sender into faces.
 
     Args:
-        wanted: function that says of a sender's address whether this sender always gets one of
-            the limited places for senders.
+        wanted: function that returns for the address of a sender whether this sender always gets
+            one of the limited places for senders.
     """
 
     def __init__(self, wanted: Callable[[str], bool] = lambda _sender: False) -> None:

@@ -81,7 +81,8 @@ class _Subject:
         self.latest: Frame | None = None
         self.lost = 0
         self._offset = 0.0
-        # the sender's time of the latest frame, plus the days counted at midnights
+        # the sender's time of the latest frame in seconds, plus a day for each midnight since
+        # the first frame
         self._sent = 0.0
         self._days = 0.0
         self._began = (0.0, 0.0)  # (time, arrival) of the first frame, seconds
@@ -126,7 +127,7 @@ class _Subject:
             return sent
         passed = arrival - last.arrival
         step, days = sent + self._days - self._sent, 0.0
-        # the sender's time of day passed midnight
+        # The step is negative because the sender's time of day returned to 0 at midnight.
         if step < -_DAY / 2.0 and step + _DAY <= passed + _AHEAD:
             step, days = step + _DAY, _DAY
         if -_BACK <= step < 0.0:

@@ -5,9 +5,10 @@ A flood of forged senders must not displace a phone. A sender that is silent for
 place when the next new sender arrives, unless it is wanted. If all places are taken:
     a wanted sender (named or recorded) always gets a place and keeps it
     a sender that has never streamed gives its place to any newcomer
-    the first sender of an address, once it has streamed, gives its place only to a wanted one
-    any other sender gives its place if its address has at least two more senders than the
-    newcomer's address, or at least as many and the sender does not stream at present
+    the first sender of an address, once it has streamed, gives its place only to a wanted sender
+    any other sender gives its place if its address has at least two more places than the
+    newcomer's address; if its address has as many places or one more, the sender gives its place
+    only while it does not stream
 """
 
 from __future__ import annotations

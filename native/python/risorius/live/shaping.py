@@ -23,7 +23,7 @@ _EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _IGNORED = {"eyeL.roll", "eyeR.roll"}
 _LOOK_AT_ONE = math.radians(30.0)  # radians of an eye's rotation at which a look control is 1
 # Cutoff frequency of the filter at speed 0 in Hz, if `smoothing` is just above 0; at `smoothing` 1
-# the cutoff is 5 % of it.
+# the cutoff is 5 % of this number.
 _STILL = 12.0
 _LONGEST_GAP = 0.5  # seconds without a frame after which the filter restarts
 Row = dict[str, float]
@@ -46,12 +46,13 @@ class Plan:
     Attributes:
         controls: names of the resulting controls.
         matrix: float32[controls, names].
-        shares: (index of a control, index of the control of which it takes back a share).
+        shares: (index of a control such as mouthClose, index of the control such as jawOpen whose
+            effect it partly undoes).
         adjusted: (index of a control, its adjustment in the mapping).
         unmapped: names without a control, except those that the mapping ignores.
         is_angle: bool[names], whether a name is an angle.
         head: bool[controls], True for the three angles of the head.
-        is_share: bool[controls], whether a control takes back a share of another.
+        is_share: bool[controls], whether a control partly undoes another one, like mouthClose.
     """
 
     def __init__(self, names: tuple[str, ...], mapping: Mapping) -> None:
@@ -106,7 +107,12 @@ def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
 
 
 def _row(said: Meaning, mapping: Mapping) -> Row:
-    """{control: weight} for a vocabulary's name; the mapping converts ARKit units to controls."""
+    """{control: weight} for a name of a known vocabulary, such as VRM.
+
+    Args:
+        said: the meaning of the name, in ARKit units or in controls.
+        mapping: converts ARKit units to controls.
+    """
     return _through(dict(said.units), mapping) if said.units else row_of(said)
 
 
@@ -151,8 +157,8 @@ class Shaper:
     Attributes:
         mapping: the Mapping; names that it lacks may be raw controls, head angles, or names of any
             vocabulary.
-        gain: factor on all controls except the head's angles and shares of another control, so that
-            shut lips stay shut.
+        gain: factor on all controls, except the head's angles and controls that partly undo another
+            control, such as mouthClose; because of this exception shut lips stay shut.
         head_gain: factor on the head's angles; a negative factor reverses them.
         gains: name in the frame -> factor, in addition to `gain`.
         smoothing: strength of the one-euro filter, 0 (none) to 1; it calms a still face and passes
@@ -230,8 +236,8 @@ class Shaper:
         if self.gains:
             values = values * np.array([self.gains.get(n, 1.0) for n in frame.names], np.float32)
         result = plan.matrix @ values
-        # The control of which a share is taken back is read before `gains`, because a gain of the
-        # jaw must not part the lips.
+        # mouthClose undoes a share of jawOpen. The share is computed with the value of jawOpen
+        # before `gains`, because a gain of the jaw must not part the lips.
         for place, whole in plan.shares:
             result[place] = share_of(result[place], plan.matrix[whole] @ plain)
         for place, change in plan.adjusted:

@@ -22,11 +22,12 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
 
     If all parents have joint groups with equal rows and columns, the mix has these groups too.
     Otherwise joint groups that share a joint are merged into one group with all their rows and
-    columns, or into several if one would have over four times as many coefficients as they. Groups
-    that move a joint with quaternion rotation are never merged.
+    columns, or into several groups if a single one would have over four times as many
+    coefficients as the merged groups together. Groups that move a joint with quaternion rotation
+    are never merged.
 
     Args:
-        parents: compatible faces.
+        parents: compatible faces, which are mixed.
         share: weights of the parents for each joint.
     """
     groups = [list(p.joint_groups) for p in parents]
@@ -77,7 +78,9 @@ def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
 
 
 def _weights(share: Share, parent: int, rows: Ints) -> Doubles:
-    """float64[n]: weights of one parent for rows; only translations include the region's scale.
+    """float64[n]: weights of one parent for rows of the joint matrix.
+
+    The weight of a translation row is multiplied by the scale of the parent's region.
 
     Args:
         share: weights of the parents for each joint.
@@ -118,7 +121,9 @@ def _joints(group: JointGroup) -> list[int]:
 
 
 def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup]:
-    """Merges joint groups into one, or into one for each set of rows with the same source groups.
+    """Merges joint groups into one group, or into several if one group would have too many zeros.
+
+    Each of several groups has the rows that occur in the same source groups.
 
     Args:
         parts: (index of a parent, one of its joint groups); the groups share joints.

@@ -354,8 +354,9 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
     places = [sk.world_matrices(p, rest)[:, :3, 3] for p in parents]
     world = share.places(places)
     local = mean_of(shifts, weights)
-    # If no region is moved, all rotations are equal, and a joint has the weights of its parent, the
-    # mean of its local translations gives the same position without rounding errors.
+    # If no region is moved, the mixed faces have equal rotations, and a joint has the same weights
+    # as the joint above it, the mean of the joint's local translations gives the same position
+    # without rounding errors.
     alike = all(np.array_equal(turns[0], t) for t in turns[1:]) and not share.shift.any()
     frames = np.tile(np.eye(4), (count, 1, 1))
     matrices = sk.rotation_matrices(Convention.of(out), rotations)

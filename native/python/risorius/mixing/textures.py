@@ -79,8 +79,8 @@ def mix_textures(
     taken: set[str] = set()
     for key, name in parents[most].metadata.items():
         mesh = key.split(":")[1] if key.startswith(_KEY) and key.count(":") >= 2 else ""
-        # Skips a name that is the same file as an earlier name on some file systems, and names that
-        # lead to other folders.
+        # Skips a name that differs from an earlier name only in a way that some file systems
+        # ignore, such as letter case, and names that lead to other folders.
         if mesh not in meshes or not is_file_name(name) or folded(name) in taken:
             continue
         data = [_data(p, path, key) for p, path in zip(parents, paths, strict=True)]
@@ -121,8 +121,8 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
 
 
 def _shares(mix: Mix, masks: Masks, mesh: int) -> Doubles:
-    """float64[P]: the parents' shares in a mesh's textures. A rigid mesh has the shares of its
-    region."""
+    """float64[P]: the parents' shares in a mesh's textures: for a rigid mesh the shares of its
+    region, for any other mesh the shares of the whole face."""
     part = masks.meshes[mesh] if mix.regions else np.zeros((0, 1))
     rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
     return np.asarray(mix.table()[int(part[0].argmax())] if rigid else mix.whole())

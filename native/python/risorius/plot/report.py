@@ -56,7 +56,8 @@ def render(
         facts: facts of the new face.
         levels: one row per LOD.
         rows: one row per expression.
-        worst: the expressions to draw, with the errors of a rig that uses joints only.
+        worst: the expressions to draw, which have the largest errors, with the errors of a rig
+            without blend shapes.
         dpi: resolution of bitmaps in dots per inch.
     """
     # The colour scale ends at 1.25 times the median of the drawn expressions' largest errors,

@@ -17,7 +17,8 @@ from .content.regions import COLORS
 from .drawing import draw_face, draw_lods, draw_matrix, draw_sizes
 from .drawing.paper import INK, MUTED, RULE, Canvas, settings
 
-# Sizes of the sheet and its parts in inches. LEFT is the width of two views of a head that are as
+# Sizes in inches: WIDTH of the sheet; heights of the line with the name (HEAD), of the upper row of
+# drawings (UPPER) and of the lower row (LOWER); LEFT, the width of two views of a head that are as
 # high as the joint matrix beside them.
 WIDTH, HEAD, UPPER, LOWER = 22.0, 1.15, 9.6, 5.9
 LEFT = 10.8

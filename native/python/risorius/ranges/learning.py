@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Learns the neutral and the extreme value of each control from a take.
 
-A control is not rescaled if the take does not prove its range: if it hardly moves, is never at
-rest, or does not come near its extreme. Gaze and shares of other controls are never rescaled. Both
-sides of a face get the same range.
+A control is not rescaled if the take does not prove its range: if the control hardly moves, if its
+value is too high (above 0.25) in nearly all frames, or if it does not come near its extreme. The
+controls of the gaze, and controls that partly undo another one (mouthClose), are never rescaled.
+The left and the right control of a pair get the same range.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ MOST_GAIN = 1.6
 """Largest gain; a control that would need more did not reach its extreme in the take."""
 SHORTEST = 2.0
 """Seconds: shorter takes are refused."""
-# largest gain of lids; above MOST_GAIN, because everybody can shut the eyes, so that a low peak is
-# a weak capture
+# Largest gain of the lid controls. It is larger than MOST_GAIN, because everybody can shut the
+# eyes: a low peak of a blink means that the capture is weak, not that the eyes stayed open.
 _LID_GAIN = 2.0
 _LEAST_RANGE = 0.15  # ranges below it count as hardly moving
 _LEAST_OVER_NOISE = 8.0  # smallest range in standard deviations of the noise
@@ -37,7 +38,8 @@ _WIDEST = 4  # frames to either side: largest window of the median, which limits
 _NEAR = 0.8  # fraction of the highest peak from which a peak counts as extreme
 _LOW_PEAKS = 25  # percentage of the extreme peaks that may stay below 1 after rescaling
 _LOW_BLINKS = 10  # the same for lids, because an incomplete blink is noticeable
-# In a performance, half of the peaks must reach this fraction of the highest, except lids.
+# In a performance, half of the peaks of a control must reach this fraction of its highest peak,
+# except for lids.
 _CEILING = 0.85
 _LEAST_PEAKS = 3  # in a performance, smallest number of peaks
 _SAME = 0.7  # ratio of the extremes of both sides: above it both get the smaller one
@@ -52,9 +54,9 @@ class _Measured:
         neutral: value of the control at rest.
         extreme: value of the control at its extreme.
         noise: standard deviation of the noise in a frame.
-        rests: whether a tenth of its values is at most _HIGHEST_REST.
-        has_ceiling: whether it has at least three peaks and half of them end near the highest; a
-            lid only needs the three peaks.
+        rests: whether a tenth of the values is at most _HIGHEST_REST (0.25).
+        has_ceiling: whether the curve has at least three peaks and half of them reach 85 % of the
+            highest one; a lid only needs the three peaks.
     """
 
     neutral: float
@@ -69,9 +71,9 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
     Args:
         clip: raw controls as captured, without gain, smoothing or rescaling.
-        performance: whether the take shows acting instead of one extreme after another; a control
-            is then used only if it has at least three peaks and half of them end near the highest;
-            a lid only needs the three peaks.
+        performance: whether the take shows acting instead of one extreme after another; the
+            range of a control is then used only if its curve has at least three peaks and half of
+            them reach 85 % of the highest one; a lid only needs the three peaks.
         most_gain: largest gain, 1 to 4; the largest gain of lids is at least 2.
 
     Returns:
@@ -158,7 +160,8 @@ def _peaks(curve: Doubles, neutral: float) -> Doubles:
 
 
 def _together(pair: list[_Measured]) -> _Measured:
-    """Combines the measurements of both sides, so that a symmetric face stays symmetric."""
+    """Combines the measurements of a left and a right control to the same range for both, so that a
+    symmetric face stays symmetric."""
     extremes = [side.extreme for side in pair]
     least, most = min(extremes), max(extremes)
     # If the extremes are similar, both sides get the smaller one, so that both can reach 1.

@@ -129,7 +129,8 @@ class Ranges:
         return {**metadata, _APPLIED: self.source or "without a source"}
 
     def rows(self) -> Iterable[tuple[str, str, str, str, str]]:
-        """Rows of a table: control, neutral, extreme, gain, reason why it is not used."""
+        """Rows of a table as texts: control, neutral, extreme, gain, and the reason why the range
+        is not used; "" for the reason of a used range, and for the gain of an unused one."""
         for name, (range_, reason) in self.controls.items():
             gain = "" if reason else f"{range_.gain:.2f}"
             yield name, f"{range_.neutral:.3f}", f"{range_.extreme:.3f}", gain, reason

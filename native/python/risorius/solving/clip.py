@@ -34,8 +34,8 @@ _WORTH = 3.0  # price of a control in standard errors of its value
 # A control that never differs from its initial value by more than this number is not used; if
 # `sparse` is 0, every control that differs is used.
 _LEAST = 0.01
-# lowest and highest value assumed for the typical second difference of a control's curve, at 30
-# frames per second
+# Lower and upper limit of the typical second difference of a control's curve at 30 frames per
+# second; an estimate outside these limits is replaced by the nearer limit.
 _SUDDEN = (0.004, 0.5)
 _SOON = 0.1  # change of a control above which derivatives are recomputed
 # A smaller change of all controls ends an iteration. A control that never differs from its initial
@@ -117,7 +117,7 @@ class _Frame:
         return self._at is not None and bool((raw == self._at).all())
 
     def forget(self) -> None:
-        """Discards the derivatives, so that linearise computes new ones."""
+        """Discards the derivatives, so that the next call of linearise computes new ones."""
         self._at = None
 
     def missing(self, raw: Doubles, frame: int) -> Doubles:
@@ -227,7 +227,8 @@ def _curves(job: _Job, count: int, workers: int) -> Doubles:
 
 
 def _begins(job: _Job, count: int) -> dict[int, Doubles]:
-    """Index of the first frame of each chunk -> float64[R], the controls in this frame."""
+    """Index of the first frame of each chunk of _CHUNK (24) frames -> float64[R], the controls in
+    this frame."""
     frame, at, out = _Frame(job), job.rest, {}
     for begin in range(0, count, _CHUNK):
         at = out[begin] = _nearest(job, frame, begin, at, 12)
@@ -466,9 +467,10 @@ def _noise(targets: Floats) -> float:
 def _points(
     surface: Surface, wanted: dict[int, Floats], bounds: Bounds, most: int
 ) -> npt.NDArray[np.int64]:
-    """int64[P, 2]: mesh and vertex of at most `most` evenly selected vertices.
+    """int64[P, 2]: mesh and vertex of the compared vertices, at most `most`.
 
-    Some control moves each of them by more than 0.1 mm per unit.
+    They are selected evenly among the vertices that at least one control moves by more than 0.1 mm
+    per unit.
 
     Args:
         surface: surface of the face.
@@ -506,7 +508,7 @@ def _meshes(
             end = len(surface.vertex_counts)
             raise ArgumentError(f"{name}: meshes below {end} were expected, found {shown(mesh)}")
         is_real = isinstance(value, np.ndarray) and value.dtype.kind == "f"
-        # Values beyond float32 become infinite, and are refused below.
+        # Values beyond float32 become infinite without a warning; the check below refuses them.
         with np.errstate(over="ignore"):
             array = np.asarray(value if is_real else numbers(name, value), np.float32)
         count = surface.vertex_counts[mesh]
@@ -558,7 +560,8 @@ def _moved(
 
 
 def _usual(surface: Surface) -> npt.NDArray[np.bool_]:
-    """bool[R]: True except for components of rotations."""
+    """bool[R]: the raw controls that may change by default: all except components of joint
+    rotations."""
     parts = {f"{stem}{part}" for stem in (".", ".q") for part in "xyzw"}
     names = surface.rig.raw_control_names
     return np.array([not any(name.endswith(part) for part in parts) for name in names], bool)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Finds the controls that move points of the skin to target positions.
 
-J. P. Lewis and Ken Anjyo, "Direct Manipulation Blendshapes", IEEE Computer Graphics and
-Applications 30 (4), 2010: the smallest change of the sliders, by least squares. Ozan Cetinaslan,
-"Position Manipulation Techniques for Facial Animation", PhD thesis, Porto 2016, and later papers:
-the transpose of the Jacobian in place of its inverse.
+The method "least_squares" finds the smallest change of the sliders by least squares, as in J. P.
+Lewis and Ken Anjyo, "Direct Manipulation Blendshapes", IEEE Computer Graphics and Applications 30
+(4), 2010. The method "transpose" uses the transpose of the Jacobian in place of its inverse, as in
+Ozan Cetinaslan, "Position Manipulation Techniques for Facial Animation", PhD thesis, Porto 2016,
+and later papers.
 """
 
 from __future__ import annotations
@@ -87,7 +88,8 @@ def solve_drag(
             one per direction that counts. "sparse" may miss the target by up to 0.6 mm, and uses
             controls that belong elsewhere (an ease below a tenth of the largest) only if they bring
             the points clearly nearer. If few controls do not reach the targets, more are added
-            until the points are less than 1.3 mm farther away than with least squares without ease.
+            until the points are less than 1.3 mm farther from the targets than with "least_squares"
+            if all controls had the same ease.
         smallest: price of a change, relative to the effect of the strongest control; a larger value
             misses the target by more.
         rounds: largest number of linearisations of one solution by least squares; "transpose" uses

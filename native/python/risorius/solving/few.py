@@ -26,8 +26,8 @@ _WEAK, _WEAK_ELSEWHERE = 0.05, 0.1
 # mm: if a sparse drag misses the targets by more than this, the solution with all controls is
 # computed too. If that one is nearer by more than this, controls are added to the sparse drag.
 BEHIND_MM = 1.3
-# number of attempts to add controls by derivatives; then the sparse pose is moved towards the
-# solution with all controls
+# number of attempts to add controls, chosen by derivatives; if all of them fail, the sparse pose
+# is moved towards the solution with all controls
 _MORE = 3
 _NOTHING_MM = 0.02  # mm: an attempt that brings the points nearer by less is the last one
 _WEAKEST = 0.01  # fraction of the strongest control's effect below which a control is not added

@@ -109,7 +109,7 @@ def _arrays(path: str | os.PathLike[str]) -> Performance:
     rate = float(given.item()) if given.size == 1 else np.nan
     if not (np.isfinite(rate) and rate > 0):
         raise PerformanceError(f"{path}: a rate above 0 was expected, found {given.tolist()}")
-    # values beyond float32 become infinite and are refused by the caller
+    # Values beyond float32 become infinite without a warning; read_performance refuses them.
     with np.errstate(over="ignore"):
         own = None if neutral is None else neutral.astype(np.float32)
         return Performance(frames.astype(np.float32), rate, 0.0, own)

@@ -4,8 +4,8 @@
 Basis pursuit with bounds, by following the path of the lasso: M. R. Osborne, B. Presnell and B. A.
 Turlach, "A new approach to variable selection in least squares problems", IMA Journal of Numerical
 Analysis 20 (3), 2000. The solution is a continuous function of the target, so that a drag does not
-jump from one set of controls to another, and it changes at most about as many controls as there are
-rows.
+jump from one set of controls to another, and it changes at most about as many controls as the
+equations have rows.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ _MOST_STEPS = 600  # largest number of steps of a path
 _MOST_MORE = 60
 _END = 1e-6  # fraction of the first price at which a path ends
 _FAR = 0.1  # fraction of the first residual: a target that stays farther away is out of reach
-# fraction of the possible gain that may be given up to use fewer controls, if the target is out of
-# reach
+# fraction of the possible decrease of the distance that may be given up to use fewer controls, if
+# the target is out of reach
 _LITTLE = 0.1
-# fraction of the first price below which controls hardly help, if the target is out of reach
+# If the target is out of reach, controls that the path adds below this fraction of the first price
+# hardly help.
 _CALM = 0.12
 _LEVEL = 1e-9  # smaller differences of slopes count as none
 
@@ -115,7 +116,7 @@ class _Path:
 
     def _stops(self, rate: Doubles) -> tuple[Doubles, Doubles]:
         """float64[n] each: the value at which each moving unknown stops, and the price's decrease
-        until then (infinite if it does not move).
+        until then (infinite for an unknown that does not move).
 
         Args:
             rate: float64[n], change of each unknown per decrease of the price.
@@ -132,7 +133,8 @@ class _Path:
         begins to move, and the direction of its motion (1 or -1).
 
         Args:
-            slope: float64[n], decrease of `pull` per decrease of the price.
+            slope: float64[n], decrease of the attribute `pull` (the negative gradient of half the
+                squared residual) per decrease of the price.
         """
         rests = self.state == _REST
         if self.left >= 0:
@@ -147,10 +149,11 @@ class _Path:
         return np.minimum(up, down), np.where(up <= down, 1.0, -1.0)
 
     def _moves_again(self, slope: Doubles) -> Doubles:
-        """float64[n]: the decrease of the price until each unknown at a bound leaves it.
+        """float64[n]: the decrease of the price until each unknown at a bound leaves this bound.
 
         Args:
-            slope: float64[n], decrease of `pull` per decrease of the price.
+            slope: float64[n], decrease of the attribute `pull` (the negative gradient of half the
+                squared residual) per decrease of the price.
         """
         falls = self.sign * slope - 1
         there = (self.state == _BOUND) & (falls > _LEVEL)
@@ -196,7 +199,7 @@ def cheapest_change(
     aim = aim + tolerance if alone < 0 else min(alone + tolerance, aim + max(worth, tolerance))
     way, near = float(np.linalg.norm(b)), nearest if alone < 0 else alone
     if nearest > _FAR * way and near - nearest <= _FAR * way:
-        # The target is out of reach: controls that hardly help are left out.
+        # The target is out of reach, so controls that hardly bring the point nearer are left out.
         there = _at_price(nodes, prices, calm)
         aim = max(aim, there) if there - near <= _LITTLE * (way - near) else aim
     # Rounding errors could leave the bounds.

@@ -28,7 +28,8 @@ GATED = ("PP", "FF")
 
 # Viseme -> (strength of its pull on the lips, seconds in which the pull falls to 1/e before the
 # sound, and after it). Sounds of the tongue pull weakly, so that their neighbours shape the lips.
-# Rounding begins earliest. PP and FF pull least, because their `gate` closes the lips.
+# O and U pull longest before the sound, because lips are rounded early. PP and FF pull least,
+# because gate() closes the lips for them.
 _DOMINANCE = {
     "sil": (0.8, 0.06, 0.08), "PP": (0.15, 0.05, 0.05), "FF": (0.15, 0.05, 0.05),
     "TH": (0.6, 0.06, 0.05), "DD": (0.45, 0.05, 0.05), "kk": (0.35, 0.05, 0.05),

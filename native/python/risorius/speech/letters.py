@@ -7,7 +7,8 @@ pronunciation the aligner still finds the times.
 
 from __future__ import annotations
 
-# Letters -> phonemes; the longest match counts. ^ is the beginning of the word and $ its end.
+# Letters -> phonemes; of several rules that match at a letter, the longest counts. ^ is the
+# beginning of the word and $ its end.
 _RULES = {
     "tion": "SH AH N", "sion": "ZH AH N", "ough": "AO", "augh": "AO", "eigh": "EY", "tch": "CH",
     "igh": "AY", "sch": "S K", "dge": "JH", "eau": "OW", "air": "EH R", "ear": "IH R",

@@ -23,7 +23,8 @@ STEP = 0.01
 """Seconds between two values of a loudness curve."""
 
 _PIECE = 12.0  # seconds: smallest length of a piece, if pauses allow it
-# Seconds: longest piece of `pieces`, to limit the decoder's memory; aligned pieces may be longer.
+# Seconds: longest piece that pieces() makes, to limit the decoder's memory. The pieces in which a
+# transcript is aligned may be longer.
 _LONGEST_PIECE = 30.0
 _PAUSE = 0.15  # seconds: shortest silence in which the voice may be cut
 _SHORTEST_SILENCE = 0.08  # seconds: shorter silences are not removed from phonemes
@@ -150,8 +151,10 @@ def _aligned(
 ) -> list[Phoneme] | None:
     """The transcript's phonemes with times, or None if too few of its words are heard.
 
-    Phonemes are recognised in pieces where the alignment of phonemes fails and, if the words of
-    the transcript do not match the voice exactly, in the gaps between the words that are heard.
+    The voice is cut into pieces, and the phonemes of each piece are aligned. Phonemes are
+    recognised without the transcript in pieces whose alignment fails. If the words of the
+    transcript do not match the voice exactly, they are also recognised in the gaps between the
+    words that are heard.
 
     Args:
         recogniser: decoders.
@@ -212,7 +215,8 @@ def _shifted(found: Sequence[Phoneme], begin: float, end: float) -> list[Phoneme
 def _loose_pieces(
     segments: Sequence[Segment], duration: float
 ) -> list[tuple[float, float, list[str]]]:
-    """(begin, end, words) of each piece: runs of adjacent words, and gaps without words.
+    """(begin, end, words) of each piece, in seconds. A piece is a run of adjacent words, or a gap
+    without words.
 
     Args:
         segments: the words that were heard, with times.
@@ -266,7 +270,8 @@ def _word_pieces(
 ) -> Iterator[tuple[float, float, list[str]]]:
     """(begin, end, words) of each piece, in seconds; pieces are cut in the middle of pauses.
 
-    They cover the whole duration, or end in the middle of the last pause if no word follows it.
+    The pieces cover the whole duration, or end in the middle of the last pause if no word follows
+    this pause.
 
     Args:
         segments: all words with times, and silences between them.

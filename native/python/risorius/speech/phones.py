@@ -28,7 +28,8 @@ class Phoneme(NamedTuple):
     """The word that begins with this phoneme, or ""; it ends before the next word or SIL."""
 
 
-# Viseme -> its phonemes. A diphthong is listed at its first vowel; GLIDES has both vowels.
+# Viseme -> its phonemes. A diphthong is listed at the viseme of its first vowel; GLIDES has the
+# visemes of both vowels.
 _CLASSES = {
     "sil": "SIL", "PP": "P B M", "FF": "F V", "TH": "TH DH", "DD": "T D", "kk": "K G NG HH",
     "CH": "CH JH SH ZH", "SS": "S Z", "nn": "N L", "RR": "R ER", "aa": "AA AE AH AY AW",

@@ -26,8 +26,8 @@ _NEEDS = (
 # Seconds of near silence added around each piece, because a decoder must hear speech begin.
 _PAD = 0.3
 _LAG = 0.0128  # seconds from the beginning of a frame to the middle of its 25.6 ms window
-# Likelihoods in the grammar of an inexact transcript: the next word is spoken, it is skipped, or
-# other speech precedes it.
+# Likelihoods in the grammar of an inexact transcript: the voice says the next word, the voice skips
+# this word, or other speech precedes it.
 _SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01
 _PHONE_OPTIONS: dict[str, Any] = {"beam": 1e-20, "pbeam": 1e-20, "lw": 1.0}
 # Words are decoded in a single quick pass with narrow beams, because the vote of three quick
@@ -111,7 +111,8 @@ class Recogniser:
     def align_loosely(self, samples: Samples, words: Sequence[str]) -> list[Segment]:
         """The words that the voice says, with times; other words and other speech are left out.
 
-        It serves inexact transcripts: each word may be skipped, and other speech may precede it.
+        It serves inexact transcripts: the voice may skip each word of the transcript, and other
+        speech may precede each word.
 
         Args:
             samples: samples of a piece of a voice at RATE per second.

@@ -100,7 +100,7 @@ def _runs(best: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
 
 
 def _with_words(found: list[Phoneme], words: Sequence[Segment]) -> list[Phoneme]:
-    """Sets each word at the phoneme that begins nearest to it.
+    """Sets the `word` of the phonemes: each word at the phoneme that begins nearest to it.
 
     A word is dropped if an earlier word of the list is at this phoneme, or if all is silence.
 

@@ -17,11 +17,11 @@ from .kinds import kind_of
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
-# Steps in which numbers are stored, not yet rounded down to a power of two: of positions and of
-# shapes as fractions of the face's size, of texture coordinates, and of skin weights. Steps are
-# powers of two, so that multiples of them are stored exactly. Other values are rounded: for a bust
-# of 500 mm by up to 2 um in positions and 15 um in shapes, less than a sixteenth of a pixel if it
-# fills a picture of 1024 pixels.
+# Steps in which numbers are stored: of positions (_PLACE) and of shapes (_SHAPE) as fractions of
+# the face's size, of texture coordinates, and of skin weights. A step is rounded down to a power of
+# two before it is used, so that multiples of the step are stored exactly. Other values are rounded:
+# for a bust of 500 mm by up to 2 um in positions and 15 um in shapes, which is less than a
+# sixteenth of a pixel if the bust fills a picture of 1024 pixels.
 _PLACE, _SHAPE, _TEXTURE, _WEIGHT = 2.0**-17, 2.0**-14, 2.0**-13, 2.0**-10
 _DIRECTION = 127.0
 
@@ -37,8 +37,8 @@ class _Streams:
 
         Args:
             values: whole numbers of any shape.
-            stride: numbers are stored as the difference to the number `stride` places before; 0:
-                they are stored unchanged.
+            stride: each number is stored as the difference to the number `stride` places before; 0:
+                numbers are stored unchanged.
         """
         whole = np.asarray(values, np.int64).ravel()
         if stride:
@@ -134,8 +134,11 @@ def _power(most: float) -> float:
 
 
 def _welded(mesh: Mesh) -> tuple[Ints, Ints, Ints, Ints]:
-    """Indices: position and texture coordinate of each vertex of the page, the vertex of each
-    corner, and the first corner of each polygon."""
+    """Makes one vertex from layouts with equal position and texture coordinate.
+
+    Returns indices: the position of each vertex, the texture coordinate of each vertex, the vertex
+    of each polygon corner, and the first corner of each polygon.
+    """
     layouts = mesh.face_layouts.astype(np.int64)
     places = mesh.layout_positions.astype(np.int64)
     if not len(mesh.texture_coordinates):

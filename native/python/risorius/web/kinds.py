@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-# (kind, parts of names). The first kind whose part matches counts, so that a mesh of eyelashes is
-# not of the kind eyes.
+# (kind, texts that the names of its meshes contain). The first kind with a matching text counts: a
+# mesh of eyelashes has the kind lashes and not eyes.
 _KINDS = (
     ("lashes", ("lash", "eyebrow")),
     ("hair", ("hair", "brow", "beard", "moustache", "mustache", "sideburn", "ponytail", "stubble")),

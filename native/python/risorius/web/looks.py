@@ -34,7 +34,8 @@ _SIZES = {
 }
 _ROLES = ("color", "alpha", "normal", "roughness")
 _REGION = re.compile(r"head_wm([123])_(?!normal)[A-Za-z]+(?:_[A-Za-z]{1,2})?$")
-# pixels per side of a mask: masks are soft, and the page has all of them in one picture
+# Pixels per side of a wrinkle mask. Masks are small, because they are soft and the page stores all
+# of them in one picture.
 _TILE = 128
 _FLUSH = 3  # channel number after the three sets of wrinkle normals
 # Newer exports store wrinkle normals as differences from the skin's normals, with 0.5 for no
@@ -128,10 +129,11 @@ class _Finder:
         return found
 
     def _wrinkles(self, named: dict[str, str]) -> dict[str, Any]:
-        """The table of a material's wrinkles: numbers of the normal maps, and one picture of masks.
+        """The table of a material's wrinkles: numbers of the pictures with normal maps, and the
+        number of one picture with all masks.
 
-        The list `maps` in the table contains [animated map, tile in the picture of masks, index of
-        the normal map or _FLUSH].
+        The list `maps` in the table contains [index of an animated map, tile in the picture of
+        masks, index of the normal map or _FLUSH].
 
         Args:
             named: role of a picture of this material -> file name.
@@ -179,7 +181,8 @@ class _Finder:
 
 
 def _squared(mask: Pixels) -> Pixels:
-    """uint8[_TILE, _TILE]: a mask resampled to the nearest pixels."""
+    """uint8[_TILE, _TILE]: a mask, halved while it is larger and then sampled at the nearest
+    pixels."""
     small = halved(mask, _TILE)
     row, column = ((np.arange(_TILE) * size // _TILE).astype(np.int64) for size in small.shape)
     return small[row[:, None], column[None, :]]

@@ -36,7 +36,7 @@ from .looks import Looks, find_looks
 
 _EMPTY = "page.html"
 _MARK = "<!--FACE-->"
-# Scripts of the empty page, each with its id.
+# Matches the scripts of the empty page with the ids "library" and "viewer".
 _ELEMENT = re.compile(r'<script[^>]* id="(library|viewer)"[^>]*>([^<]*)</script>')
 _BOOT = re.compile(r"<script>(/\*BOOT\*/.*?)</script>", re.DOTALL)
 # Layers of the DNA file that the evaluator needs. The geometry layer is not among them, because
@@ -153,7 +153,7 @@ def render_script(
 
 
 def _json(value: Any) -> str:
-    """JSON that cannot end the HTML element around it."""
+    """JSON text without characters that could end the HTML element in which it is written."""
     return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
 
 
@@ -255,8 +255,9 @@ def _regions(names: list[str]) -> list[dict[str, Any]]:
 def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes]:
     """The page's table about the clip, and float32[frames, controls + 4 * turns] as bytes.
 
-    The columns are the controls that the clip moves, then for each joint of neck and head its
-    rotation from the rest pose, as a quaternion x, y, z, w in the joint's own axes.
+    `turns` is the number of joints of neck and head that the clip rotates. The columns are the
+    controls that the clip moves, then for each of these joints its rotation from the rest pose, as
+    a quaternion x, y, z, w in the joint's own axes.
     """
     even = clip if clip.times is None else clip.resampled(clip.rate)
     curves = np.nan_to_num(even.curves, nan=0.0, posinf=1.0, neginf=0.0)
@@ -280,7 +281,7 @@ def _turns(given: dict[str, Any], dna: Dna) -> dict[int, Any]:
     """Joint -> float64[frames, 4], its rotation from the rest pose as a quaternion x, y, z, w.
 
     The rotation comes from the joint's four raw controls if the clip has all of them, else from the
-    angles of neck or head. Joints of which the clip has neither are left out.
+    angles of neck or head. Joints for which the clip has neither are left out.
     """
     controls = {item.joint: item for item in joint_controls(dna)[0]}
     raw = dna.raw_control_names

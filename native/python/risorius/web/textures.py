@@ -71,8 +71,8 @@ def media_type(data: bytes) -> str:
 
 
 def halved(pixels: Pixels, longest: int) -> Pixels:
-    """Halves a picture, by the mean of 2 x 2 pixels, until no side is longer than `longest` or one
-    side has a single pixel.
+    """Halves a picture repeatedly, by the mean of 2 x 2 pixels, until no side is longer than
+    `longest`, or until one side has a single pixel.
 
     Args:
         pixels: uint8[h, w] or [h, w, k].

@@ -181,8 +181,8 @@ _PARTS = (("eyeball", BALL, _COARSE_BALL), ("cornea", SHELL, _COARSE_CORNEA))
 
 
 def with_eyeballs(base: BaseMesh) -> BaseMesh:
-    """The base mesh with additional groups eyeball-l, cornea-l and so on, and coarse versions of
-    them.
+    """The base mesh with additional groups for an eyeball and a cornea on each side (such as
+    eyeball-l and cornea-r), and groups for their coarse versions.
 
     The new vertices are at the origin; `seat` moves them into a face.
 
@@ -244,7 +244,7 @@ def pupil_wide(radius: float, side: str) -> Floats:
     """float64[ball vertices, 3]: displacement that moves the pupil's rim outwards by the radius of
     the iris.
 
-    The rings of the iris move the less the farther out they are; the root of the iris stays.
+    The farther out a ring of the iris is, the less it moves; the root of the iris does not move.
 
     Args:
         radius: radius of the ball in decimetres.

@@ -10,14 +10,15 @@ from ..polygons import Floats, Ints, Operator, Polygons, compact_uvs, subdivide
 from ..source import BaseMesh
 from .rings import COLUMNS, LOWER, ROOT, TEMPLE, find_rings
 
-# Name of a mesh -> groups of the base mesh.
+# Name of a mesh of the eyes -> groups of the base mesh from which it is made.
 _BALLS = {
     "eyeLeft": ["eyeball-l"],
     "eyeRight": ["eyeball-r"],
     "cornea": ["cornea-l", "cornea-r"],
 }
-# Cross sections of the caruncle: (number of grid columns from the eye's inner corner, position `at`
-# across the rim as in _rim, height above the line between both rims in lid thicknesses).
+# Cross sections of the caruncle, each as a tuple: number of grid columns from the eye's inner
+# corner; position across the lid's rim (0 at the lashes' roots, 2 to 3 where the rim meets the
+# eye); height above the line between upper and lower rim, in lid thicknesses.
 _MOUND = (
     (0, 0.35, -0.02),
     (0, 1.0, 0.10),

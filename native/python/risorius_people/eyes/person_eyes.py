@@ -13,7 +13,8 @@ from . import eyeball, lids
 from .lids import Lids
 from .rings import ROOT, find_rings
 
-# By age in years: height of the upper lids above the eye's middle, in radii of the iris.
+# Ages in years, and for each age the height of the upper lids above the eye's middle in radii of
+# the iris.
 _AGES, _OPEN = (8, 30, 75), (0.78, 0.70, 0.60)
 _SIDES = (("l", "L"), ("r", "R"))
 _LASH_RINGS = slice(ROOT - 1, ROOT + 1)

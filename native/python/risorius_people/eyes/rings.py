@@ -102,8 +102,8 @@ def _beside(ring: list[int], faces: Faces, edges: Edges, way: int) -> list[int]:
         ring: vertices of a closed loop of edges.
         faces: vertex indices of each face; all faces are quads.
         edges: edge -> numbers of its faces.
-        way: 0 or 1, chooses the side: where this one of both faces of the ring's first edge lies,
-            in the order of `edges`.
+        way: 0 or 1, index of one of the two faces at the ring's first edge, as `edges` lists them;
+            the returned ring is on the side of this face.
     """
     out = []
     face = edges[(min(ring[:2]), max(ring[:2]))][way]

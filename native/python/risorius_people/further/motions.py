@@ -47,7 +47,8 @@ def _number(by: object) -> float:
 def _lid_turn(places: Places, by: object) -> Floats:
     """Rotates about the middle of the eye, so that a lid slides on the ball.
 
-    `by` is 1 (up) or -1 (down). The row's `size` sets the length of the displacement.
+    `by` is 1 (up) or -1 (down). The key `size` of the row in further.toml sets the length of the
+    displacement.
     """
     arm = places.positions - places.eye_of()
     way = np.cross(np.array([-1.0, 0, 0]), arm)
@@ -67,7 +68,8 @@ def _lid_press(places: Places, _: object) -> Floats:
 
 
 def _lashes_up(places: Places, by: object) -> Floats:
-    """Rotates upper lashes up; `by` -1: the half of the lid at the nose, 1: at the temple."""
+    """Rotates upper lashes up: with `by` -1 on the half of the lid at the nose, with 1 on the half
+    at the temple."""
     positions, groups = places.positions, places.groups
     out = np.zeros_like(positions)
     for letter in "lr":
@@ -81,12 +83,14 @@ def _lashes_up(places: Places, by: object) -> Floats:
 
 
 def _lashes_down(places: Places, by: object) -> Floats:
-    """Rotates upper lashes down; `by` -1: the half of the lid at the nose, 1: at the temple."""
+    """Rotates upper lashes down: with `by` -1 on the half of the lid at the nose, with 1 on the
+    half at the temple."""
     return -_lashes_up(places, by) * np.array([1.0, 1.0, -1.0])
 
 
 def _pupil(places: Places, by: object) -> Floats:
-    """Moves the pupil's rim along the ball; `by` 1: wider, -1: narrower. The iris' rim stays."""
+    """Moves the pupil's rim along the ball: with `by` 1 the pupil becomes wider, with -1 narrower.
+    The outer rim of the iris does not move."""
     out = np.zeros_like(places.positions)
     for side, middle in places.eyes.items():
         eye = places.groups[f"helper-{side.lower()}-eye"]
@@ -144,8 +148,8 @@ def _root(points: Floats, share: Floats, begin: float) -> Floats:
 
 
 def _tongue_way(places: Places, by: object) -> Floats:
-    """Shifts the tongue along the vector `by`; towards the root the shift falls to 0. The row's
-    `size` sets the length of the largest displacement."""
+    """Shifts the tongue along the vector `by`; towards the root the shift falls to 0. The key
+    `size` of the row in further.toml sets the length of the largest displacement."""
     _, _, share = _on_tongue(places)
     return _of_tongue(places, smooth_step(share / 0.6)[:, None] * _vector(by))
 
@@ -162,8 +166,8 @@ def _tongue_rotation(power: float, begin: float) -> Motion:
 
 
 def _tongue_scale(places: Places, by: object) -> Floats:
-    """Scales the tongue's width and height about its middle; its root stays. `by` has the fraction
-    by which each axis grows, negative to shrink."""
+    """Scales the tongue's width and height about its middle; its root does not move. `by` has a
+    number for each axis: the fraction by which the tongue grows there, negative to shrink."""
     _, points, share = _on_tongue(places)
     middle = np.zeros_like(points)
     for at in np.unique(share.round(2)):

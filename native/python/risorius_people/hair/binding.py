@@ -41,7 +41,8 @@ def head_of(dna: Dna, lod: int) -> Mesh | None:
 
 def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
     """int64[T, 3], vertices of the triangles into which a mesh's polygons are split; int64[V, n],
-    indices of the triangles at each vertex, where a short row repeats its last one."""
+    indices of the triangles at each vertex. The row of a vertex with fewer than n triangles
+    repeats its last index."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
     sizes = np.diff(offsets)
@@ -198,7 +199,8 @@ def bind(
         least: length in the unit of the mesh; a shape whose largest displacement is smaller is left
             out.
         rigid: whether places that move less than `least` follow the head joint alone.
-        turns_itself: whether to leave out the rotation by shapes, because the caller adds its own.
+        turns_itself: whether to leave out the rotation of cards by blend shapes, because the caller
+            adds shapes with its own rotation.
     """
     weights = places.of(sk.dense_weights(head, len(dna.joint_names)))
     if rigid:

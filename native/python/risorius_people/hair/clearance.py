@@ -110,7 +110,8 @@ def cut_clear(
 
 
 def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
-    """The results of `work` for all rows in order; a thread computes them in advance."""
+    """The results of `work` for all rows, in the order of the rows; a thread computes the next
+    results while the caller uses earlier ones."""
     waiting: deque[Future[T]] = deque()
     with ThreadPoolExecutor(1) as pool:
         for row in rows:
@@ -122,7 +123,17 @@ def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
 
 
 class _Ground:
-    """The skin near the hairs, and its motion with the face. Arguments are as in cut_clear."""
+    """The skin near the hairs, and its motion with the face.
+
+    Args:
+        strips: the hair in decimetres.
+        dna: the finished face.
+        head: the head mesh of LOD 0.
+        unit: length of a decimetre in the unit of the mesh.
+
+    Attributes:
+        rest: float64[m, 3], neutral positions of the skin's vertices near the hairs, in decimetres.
+    """
 
     def __init__(self, strips: Strips, dna: Dna, head: Mesh, unit: float) -> None:
         self.unit, self._dna, self._rig = unit, dna, Rig(dna)
@@ -154,7 +165,7 @@ class _Ground:
                 )
 
     def roots(self, strips: Strips) -> Roots:
-        """The roots of strips, as weights of vertices; vertices are numbered as in `rest`."""
+        """The roots of strips on the skin near the hairs; their corners are rows of `rest`."""
         return Roots(self.row[strips.roots.corners], strips.roots.shares)
 
     def normals(self, skin: Floats) -> Floats:
@@ -202,8 +213,8 @@ class _Posed:
     def _carried(self, strips: Strips) -> Floats:
         """float64[n, rows, 2, 3]: positions of the left and right edges in the pose.
 
-        The edges move like cards that follow their roots: with the joints of the skin there, and
-        rotated if a blend shape tilts the skin.
+        The edges move like cards that follow their roots: with the joints that move the skin at the
+        root, and rotated if a blend shape tilts the skin.
         """
         ground = self._ground
         roots = ground.roots(strips)

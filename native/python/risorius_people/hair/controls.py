@@ -103,7 +103,8 @@ def _middles(positions: Floats, rows: int) -> Floats:
 
 
 def _angle(ways: Floats) -> Floats:
-    """float64[n]: elevation of each direction seen from the side, in radians."""
+    """float64[n]: angle in radians between the front (+z) and each direction, seen from the side;
+    positive up."""
     return np.asarray(np.arctan2(ways[:, 1], ways[:, 2]))
 
 

@@ -20,7 +20,7 @@ _BEARD_SPACING = 0.037  # decimetres between the roots of two cards
 _OVER_LIP = 0.6  # factor on spacing and width of the beard's cards
 _LONGEST_OVER_LIP = 0.08  # decimetres: longest hair above the lip
 _RIM = 0.010  # decimetres from the data's line of lashes to the outer rim of the lid
-# lid -> (number of cards, longest hair in decimetres)
+# U (upper lid) or D (lower lid) -> (number of lash cards of one lid, longest lash in decimetres)
 _LASHES = {"U": (48, 0.098), "D": (26, 0.044)}
 
 

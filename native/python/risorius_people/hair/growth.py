@@ -43,7 +43,8 @@ def grow(
             rises from 0 at the root to this value at a third of the length.
         stiff: weight of the previous direction in each step, 0 to 1.
         fall: float64[n] or a number, weight of gravity at the tip.
-        hug: weight of the pull back to the skin on guides that are above the lobes of the ears.
+        hug: weight of the pull that keeps guides near the skin above the height of the ear lobes;
+            0: no pull.
         sway: float64[n, 3], constant offset of each guide's direction from the flow. Noise in the
             flow would instead bend a card at every vertex.
 

@@ -31,9 +31,9 @@ from .surface import Surface
 PICTURE = "hair_color.png"
 NO_HAIR = 4  # number of the first LOD without hair cards
 _SHARES = (1.0, 0.42, 0.2, 0.1)  # fraction of the strips that is kept at each LOD
-# Fraction of the brows' strips that is kept at LODs 0 to 3. The fraction is larger than for other
-# hair, because fewer cards must be wider, and wide cards look like dashes while the face is large
-# on the screen.
+# Fraction of the brows' strips that is kept at LODs 0 to 3. At LODs 1 and 2 it is larger than for
+# other hair, because fewer cards must be wider, and wide cards of brows look like dashes while the
+# face is large on the screen.
 _BROWS = (1.0, 0.75, 0.3, 0.1)
 _MOST_VERTICES = 12_000  # limit for all cards at LOD 0 together
 _OWN = ("hair", "beard")  # meshes that not all people have
@@ -51,7 +51,10 @@ _PITCH = 2.4  # distance between turns, in radii of the coil, for hair_curl 1
 
 @dataclass
 class Grown:
-    """The hair of a person: mesh (hair, brows, beard, eyelashes) -> strips, if there are any."""
+    """The hair of a person.
+
+    `strips` has a key for each mesh of hair that the person has: hair, brows, beard, eyelashes.
+    """
 
     strips: dict[str, Strips]
     unit: float  # length of a decimetre in the unit of the Dna's meshes

@@ -16,7 +16,8 @@ from .growth import curled, eased, grow, tangent
 from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
-# Position of the whorl at the crown, in decimetres on the man's head as in Surface.man.
+# Position of the whorl at the crown on the man's head, in decimetres: x from the middle of the
+# face, y and z from the middle of the left eye.
 _WHORL = np.array([0.10, 0.86, -1.40])
 _PARTING = 0.10  # x of the parting on the man's head; his left is positive
 _THIN = TILES["scalp"][4] - DENSE  # number of thin tiles
@@ -63,8 +64,9 @@ def _roots(
         style: hair style, a key of HAIRLINES.
         even: False for short hair, which is denser where it lies flat, and sparser where it stands
             up.
-        fine: above 0, hair is denser at the hairline than behind it; with 1 it is as dense at a
-            parting.
+        fine: 0: the density behind the hairline is even; above 0: hair is denser at the hairline
+            than behind it, except along the parting, where with 1 it is as dense as at the
+            hairline.
     """
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[style])
@@ -294,7 +296,8 @@ def _ended(
     Args:
         surface: surface of the head.
         points, out: float64[n, rows, 3] each, from `grow`.
-        end: float64[n], height y of each guide's end on the man's head, as in Surface.man.
+        end: float64[n], height y of each guide's end on the man's head, in decimetres above the
+            middle of the left eye.
         near: indices of vertices that the guides may come near.
     """
     n, rows, _ = points.shape
@@ -333,7 +336,8 @@ def parted_flow(surface: Surface) -> Floats:
     return tangent(flow, surface.normals)
 
 
-# Position of the bun, in decimetres on the man's head as in Surface.man.
+# Position of the bun on the man's head, in decimetres: x from the middle of the face, y and z from
+# the middle of the left eye.
 _KNOT = np.array([0.0, 0.46, -1.72])
 
 
@@ -354,7 +358,8 @@ def bun(surface: Surface, person: Person) -> Strips:
     sway = 0.05 * random.normal(0, 1, (n, 3))
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    # from 0 at the height of the eyes to 1 at 0.4 dm above them, where hair is loose
+    # Fullness of the hair, which makes it stand off the head: from 0 at the height of the eyes to 1
+    # at 0.4 dm above the eyes.
     full = smooth_step(man[:, 1] / 0.4)
     rise = np.radians(random.uniform(3, 9, n) + 9 * full), np.zeros(n)
     above = _scalp_vertices(surface)

@@ -88,7 +88,7 @@ def gap_across(mouth: Mouth, points: Floats) -> tuple[Floats, Floats]:
 
 
 def sealed(mouth: Mouth, positions: Floats) -> Floats:
-    """float64[V, 3]: positions with closed lips; each lip goes half of the way.
+    """float64[V, 3]: positions with closed lips; each lip moves by half of the gap.
 
     Args:
         mouth: the mouth of the base mesh.

@@ -22,7 +22,8 @@ MM = 0.01
 
 @dataclass(frozen=True)
 class Tooth:
-    """Measures of a crown in mm: along the arch, from lip to tongue, and from edge to gum."""
+    """Measures of a crown in mm: `wide` along the arch, `thick` from lip to tongue, and `high` from
+    the biting edge to the gum."""
 
     kind: str  # "incisor", "canine" or "molar"
     wide: float
@@ -50,8 +51,8 @@ LOWER = (
 )
 # Heights of the rows of a crown: 0 at the edge, 1 at the gum, above 1 in the root.
 _HEIGHTS = (0.0, 0.05, 0.16, 0.38, 0.66, 0.88, 1.02, 1.25)
-# Kind of tooth -> at each of these heights: fraction of half the width, fraction of half the
-# thickness, and offset of the lip side in mm.
+# Kind of tooth -> three lists with a number for each of _HEIGHTS: fraction of half the width,
+# fraction of half the thickness, and offset of the lip side in mm.
 _PROFILES = {
     "incisor": (
         (0.84, 0.93, 0.98, 1.0, 0.94, 0.86, 0.8, 0.72),
@@ -373,7 +374,7 @@ def mouth_parts(base: BaseMesh, lod: int) -> list[Part]:
 
 
 def joined(parts: list[tuple[Polygons, Operator]]) -> tuple[Polygons, list[Operator]]:
-    """Joins meshes into one, and their operators as well.
+    """Joins meshes into one mesh, and their operators into one operator, returned as a list.
 
     Args:
         parts: the meshes, each with the operator that makes its vertices.

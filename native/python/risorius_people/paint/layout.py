@@ -14,8 +14,9 @@ from ..polygons import Floats, Ints, Polygons
 
 STRIP = 0.22  # fraction of the texture's height for all islands except the face
 _MARGIN = 0.006  # margin around each island, as a fraction of the texture's side
-# Across and down the face island: middle of the enlarged area and its reach, as fractions of the
-# island's width or height; and its texel density relative to the island's rim.
+# (middle, reach, density) of the enlarged area in the middle of the face island, across (_ACROSS)
+# and down (_DOWN). Middle and reach are fractions of the island's width or height; density is the
+# number of texels per length in the middle of this area relative to the island's rim.
 _ACROSS = (0.5, 0.19, 2.0)
 _DOWN = (0.63, 0.25, 1.45)
 

@@ -72,7 +72,8 @@ def hairline_height(
         points: float64[n, 3], on the man's head.
         recession: amount by which the hairline has receded at temples and forehead, 0 to 1.
         sideburn: length of the hair in front of the ear, 0 to 1.
-        low: how low and round the hairline over the forehead is, as for women, 0 to 1.
+        low: 0 to 1: 0 for the usual hairline; 1 for a hairline that is lower and rounder over the
+            forehead, as of many women.
     """
     line = _LINE.copy()
     line[_NO_SIDEBURN, 1] = (1 - sideburn) * 0.1 + sideburn * line[_NO_SIDEBURN, 1]

@@ -64,7 +64,8 @@ class Face:
 
         Args:
             x, y: position of the spot's middle.
-            wide, high: distances from the middle at which the spot falls to a third.
+            wide, high: distances from the middle, to the side and up, at which the spot falls to a
+                third of its value in the middle.
         """
         away = ((self.aside - x) / wide) ** 2 + ((self.y - y) / high) ** 2
         return np.asarray(np.exp(-away) * smooth(-0.5, -0.1, self.z))

@@ -19,7 +19,8 @@ from .places import HAIRLINES, beard_density, brow_density, hairline_height, thi
 from .raster import Raster
 
 HEAD_SIZE = 2048
-# Absorption of linear red, green and blue by a unit of each pigment.
+# Absorption of linear red, green and blue by a unit of a pigment: melanin, blood in veins under the
+# skin, and the skin's yellow.
 _MELANIN = np.array([0.42, 0.70, 1.0], np.float32)
 _VEINS = np.array([0.42, 0.26, 0.10], np.float32)
 _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
@@ -42,7 +43,7 @@ def encoded(light: Floats) -> Floats:
 
 
 def depth_of(person: Person) -> float:
-    """Darkness of a person's skin, 0 to 1."""
+    """Darkness of a person's skin, from 0 (light) to 1 (dark)."""
     light = float(linear(np.array(person.skin)) @ [0.21, 0.72, 0.07])
     return float(smooth(0.42, 0.06, np.array(light)))
 
@@ -200,7 +201,8 @@ class Skin:
         return np.asarray(out)
 
     def _vessels(self) -> Floats:
-        """Amount of fine vessels on cheeks and noses of old people with light skin."""
+        """float32[n]: amount of fine blood vessels, which are visible on cheeks and noses of old
+        people with light skin."""
         amount = self.old * (1 - self.deep)
         if amount <= 0:
             return np.zeros(1, np.float32)
@@ -210,7 +212,7 @@ class Skin:
         return np.asarray(0.5 * amount * there * lines * np.clip(self.texels.coarse, 0, 1.5))
 
     def _spots(self) -> Floats:
-        """Amount of melanin in freckles, age spots and moles."""
+        """float32[n]: amount of melanin in freckles, age spots and moles."""
         field, texels, person = self.field, self.texels, self.person
         out = np.zeros(len(texels.place), np.float32)
         bent = 0.05 * texels.middle
@@ -232,7 +234,13 @@ class Skin:
         return out
 
     def _hair(self, light: Floats) -> Floats:
-        """Adds roots of beard, brows and hair: their shadow in the skin, and stubble as dots."""
+        """float32[n, 3]: linear light with the roots of beard, brows and hair.
+
+        The roots are a shadow in the skin; stubble consists of dots.
+
+        Args:
+            light: float32[n, 3], linear light of the skin.
+        """
         person, texels = self.person, self.texels
         hair = linear(np.array(person.hair))
         scalp = self.scalp
@@ -268,8 +276,14 @@ class Skin:
         return out
 
     def _lips(self, light: Floats) -> Floats:
-        """Adds the red of the lips: pale and pigmented at the rim, with lines across, darker where
-        the lips meet."""
+        """float32[n, 3]: linear light with the red of the lips.
+
+        The lips are pale and pigmented at the rim, have lines across, and are darker where they
+        meet.
+
+        Args:
+            light: float32[n, 3], linear light of the skin.
+        """
         person, texels, ring = self.person, self.texels, self.field["mouth"]
         if not (ring < regions.FAR_RINGS).any():
             return light
@@ -298,7 +312,12 @@ class Skin:
         return np.asarray(tile[down, across])
 
     def _inside(self, light: Floats) -> Floats:
-        """Adds the wet colours of the inside of the mouth and of the skin behind the lids."""
+        """float32[n, 3]: linear light with the wet colours of the inside of the mouth and of the
+        skin behind the lids.
+
+        Args:
+            light: float32[n, 3], linear light of the skin.
+        """
         ring, texels = self.field["mouth"], self.texels
         mucosa = linear(np.array(_MUCOSA)) * (1 - 0.25 * self.deep)
         mucosa = mucosa * np.exp(-0.16 * (texels.coarse + texels.middle)[:, None] * [0.3, 1.0, 0.9])

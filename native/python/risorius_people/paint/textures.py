@@ -66,8 +66,9 @@ def lasting(place: Floats, eye: Floats) -> Floats:
 
 
 def between_brows(place: Floats, eye: Floats) -> Floats:
-    """float64[h, w], 0 to 1: mask of the frown's lines, where other lines across them would form a
-    grid.
+    """float64[h, w], 0 to 1: mask of the area between the brows, where the lines of a frown are.
+
+    Lines of other expressions would cross these lines and form a grid.
 
     Args:
         place: float64[h, w, 3], position of each texel on the head in decimetres.
@@ -101,7 +102,9 @@ def head_wrinkles(
     units: dict[str, Expression],
     size: int,
 ) -> Wrinkles:
-    """Paints the masks of wrinkles, and the normal maps of texture sets relative to flat normals.
+    """Paints the masks of wrinkles, and a normal map for each texture set.
+
+    The normal maps store differences from flat normals.
 
     Args:
         person: the person, with the age.
@@ -258,9 +261,9 @@ def paint_textures(
 def packable(name: str, image: Floats, largest: int) -> Floats:
     """A texture at the size and precision in which it is stored.
 
-    Textures of eyes have at most half of this side. If `largest` is at most 1024, as for the
-    released zip, head and eyes keep 7 of 8 bits, the head's roughness 6, because the lower bits are
-    noise, which PNG cannot compress.
+    The sides of the eyes' textures are at most half as long as of other textures. If `largest` is
+    at most 1024, as for the released zip, the textures of head and eyes keep 7 of 8 bits, and the
+    head's roughness keeps 6, because the lower bits are noise, which PNG cannot compress.
 
     Args:
         name: file name of the texture.
@@ -270,6 +273,7 @@ def packable(name: str, image: Floats, largest: int) -> Floats:
     out = shrunk(image, largest // 2 if name.startswith("eye") else largest)
     if largest > 1024 or not name.startswith(("head_", "eye_")):
         return out
-    # Both numbers of steps map 128 of 255, a flat normal, to a whole step.
+    # With both numbers of steps, the byte 128, which means a flat normal, is a multiple of the
+    # step.
     steps = 63.75 if "roughness" in name else 127.5
     return np.round(out * steps) / steps

@@ -129,7 +129,12 @@ def see(code):
 
 
 def state():
-    """Frame, areas, last operator; if there is a face, its sliders except 0, layers and modes."""
+    """The state of Blender for checks: the current frame, the types of the areas, the last
+    operator.
+
+    If there is a face, also its sliders that are not 0, its layers, whether it has an action, its
+    look and heat map, and the mode of its control armature.
+    """
     found = rig()
     operators = bpy.context.window_manager.operators
     out = {

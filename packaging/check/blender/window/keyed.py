@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tests that keyframes are visible in the timeline, and that a tweak layer receives new ones."""
+"""Tests that keyframes are visible in the timeline, and that new ones go into an open tweak."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ FIELD = r'CTRL_expressions\.jawOpen"\]$'
 
 
 def keyed(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Test Key All with the head selected, pressing I over a slider and in a tweak, and Done."""
+    """Test three ways to insert keyframes, and the button Done, which ends a tweak.
+
+    Keyframes are inserted by Key All while the head mesh is selected, by I over a slider, and by
+    I over a slider during a tweak.
+    """
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)

@@ -16,10 +16,10 @@ def search(hand: Hand, words: str, operator: str = "", keys: str = "Return") -> 
 
     Args:
         hand: the pointer.
-        words: search text.
-        operator: bl_idname that the last operator must have afterwards; "" for dialogs, which are
-            not checked.
-        keys: keys that confirm the entry.
+        words: text to type into the search field.
+        operator: bl_idname of the operator that must have run at the end; "" for an operator that
+            opens a dialog, because it has not run yet.
+        keys: keys that run the first search result.
 
     Raises:
         LateError: the operator did not run.
@@ -38,7 +38,10 @@ def search(hand: Hand, words: str, operator: str = "", keys: str = "Return") -> 
 
 
 def open_face_menu(hand: Hand) -> tuple[float, float]:
-    """Click on the menus of the view's header until Face opens. Returns x and top of the menu."""
+    """Click along the 3D viewport's header until the menu Face opens.
+
+    Returns x and the upper edge of the menu, in pixels of the window.
+    """
     hand.ask("watch", panel="RISORIUS_MT_face")
     left, top, width, height = hand.see("rectangle(header_of_view())")
     hand.do("key", "Escape")
@@ -59,8 +62,8 @@ def in_menu(hand: Hand, pattern: str, x: float, top: float, high: int = 420) -> 
     Args:
         hand: the pointer.
         pattern: regular expression of the command.
-        x, top: place of the menu, pixels.
-        high: height of the searched area, pixels.
+        x, top: x and the upper edge of the menu, in pixels of the window.
+        high: height of the area below `top` that is searched for the entry, pixels.
     """
     area = [round(x) - 20, round(top), 200, high]
     hand.click(*hand.find(pattern, columns=(0.35,), area=area, step=9))
@@ -96,7 +99,8 @@ def name_file(hand: Hand, path: Path, ending: str = "Return") -> None:
     Args:
         hand: the pointer.
         path: path of an existing file, or of a folder.
-        ending: key that confirms the file browser; "" opens the folder only.
+        ending: key that confirms the file browser; with "", the path is a folder, which the file
+            browser shows without being confirmed.
     """
     hand.wait("the file browser", lambda: "FILE_BROWSER" in hand.ask("state")["areas"])
     hand.still()
@@ -118,7 +122,7 @@ def _write(hand: Hand, region: str, column: float, text: str) -> None:
 
     Args:
         hand: the pointer.
-        region: type of the region.
+        region: type of the file browser's region that contains the field, such as EXECUTE.
         column: horizontal place of the field, as a fraction of the region's width.
         text: the text.
     """

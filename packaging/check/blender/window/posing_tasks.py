@@ -27,7 +27,10 @@ BROW = ("CTRL_expressions.browRaiseOuterL", "CTRL_expressions.browRaiseOuterR")
 
 
 def smirk(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Raise one corner of the mouth and one brow: by sliders, by dragging, and mirrored."""
+    """Raise one corner of the mouth and one brow by sliders, and again by dragging the skin.
+
+    Then mirror the face by an operator.
+    """
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -96,7 +99,10 @@ def _wheel(hand: Hand, control: str, notches: int) -> None:
 
 
 def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Insert keyframes (neutral, blink, surprise, neutral), check them in editors, move a few."""
+    """Insert keyframes: neutral, blink, surprise, neutral. Check that the editors show them.
+
+    The keyframes of surprise are then moved.
+    """
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
@@ -118,9 +124,14 @@ def two_seconds(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _in_editors(hand: Hand, frames: list[int]) -> Iterator[Check]:
-    """Check the keyframes in the dope sheet and in the graph editor, and move some by four frames.
+    """Check that the dope sheet and the graph editor show the keyframes.
 
-    Each editor fills the window.
+    In the dope sheet, the keyframes at frame 24 are moved by four frames. Each editor fills the
+    window.
+
+    Args:
+        hand: the pointer.
+        frames: frames that have keyframes.
     """
     area = hand.ask("ready")["areas"]["DOPESHEET_EDITOR"]
     over_keys = (area[0] + area[2] * 0.7, area[1] + area[3] * 0.6)
@@ -206,7 +217,7 @@ def gaze(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _turn(hand: Hand) -> Iterator[Check]:
-    """Click on the head bone's outline, turn the bone, insert a keyframe, and add a blink."""
+    """Select the head bone by its outline, turn it at two frames by R, Z and I, and add a blink."""
     hand.ask("center", zoom=0.6)
     hand.still()
     hand.click(*hand.ask("outline_at", bone="head"))

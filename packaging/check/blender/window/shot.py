@@ -37,7 +37,7 @@ def key_all(hand: Hand) -> None:
 
 
 def expression(hand: Hand, name: str) -> None:
-    """Search for an expression and click on its picture. The section must be open."""
+    """Search for an expression and click on its picture. Its section of the tab must be open."""
     hand.ask("run", code=f"bpy.context.window_manager.risorius_expressions.search = {name!r}")
     hand.wait("its picture is drawn", lambda: hand.ask("pictures_drawn", expression=name))
     scroll(hand)
@@ -98,7 +98,10 @@ def _idle(hand: Hand) -> Iterator[Check]:
 
 
 def _play(hand: Hand) -> Iterator[Check]:
-    """Type the scene's last frame, compare the pixels of some frames, and play."""
+    """Type the scene's last frame, and play the animation.
+
+    Before playing, check that the pixels of the face differ between successive poses.
+    """
     header = hand.ask("timeline_header")
     columns = tuple(1.0 - 0.015 * step for step in range(40))
     place = hand.find("frame_end", of_field=True, columns=columns, area=header)

@@ -117,7 +117,7 @@ bpy.context.view_layer.objects.active = rig()["risorius_controls"]
 
 
 def _pressed(hand: Hand, start: Place) -> tuple[int, Place]:
-    """The vertex that a press takes, and its offset from the pointer in pixels.
+    """The vertex that a press of the mouse button grabs, and its offset from the pointer in pixels.
 
     Drags once to find the vertex, and undoes the drag.
     """
@@ -147,8 +147,8 @@ def drag_in_views(hand: Hand, _dna: Path) -> Iterator[Check]:
         hand.move(*start)
         hand.drag(start, end)
         state = hand.ask("state")
-        # If the head is small, a pixel covers millimetres. So the pointer is compared with
-        # the vertex that the press took, and not with the vertex at which the press was aimed.
+        # If the head is small in the view, a pixel covers millimetres, so the press may grab a
+        # neighbour of `vertex`. The pointer is compared with the vertex that the press grabbed.
         at = hand.ask("seen_in_front", vertex=state["dragged"])
         moved = len(state["sliders"]) > 0
         hand.picture("skin-" + name.replace(" ", "-"))

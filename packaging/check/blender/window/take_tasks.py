@@ -70,7 +70,7 @@ def _smile(hand: Hand) -> Iterator[Check]:
 
 
 def _tweak(hand: Hand) -> Iterator[Check]:
-    """Open the jaw more around frame 50 in a tweak, by the wheel and the key I over the slider."""
+    """Start a tweak around frame 50, and open the jaw more by the wheel and I over its slider."""
     below = hand.ask("curves_below")
     go_to(hand, 50)
     search(hand, "Tweak over a Range")

@@ -57,7 +57,7 @@ def voice(hand: Hand, _dna: Path) -> Iterator[Check]:
 
 
 def _replace(hand: Hand) -> Iterator[Check]:
-    """Select a sound in the list and replace it by the menu. Only keyframes near it may change."""
+    """Replace a sound of the list by another from a menu. Only keyframes near it may change."""
     word_set = hand.find(r"risorius\.word_set")
     x, y = hand.find(r"risorius\.sound_insert", columns=(0.93, 0.97, 1.0))
     before, frame = hand.see(CHOSEN), hand.ask("state")["frame"]

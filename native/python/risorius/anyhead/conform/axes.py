@@ -48,7 +48,7 @@ def standing_skin(dna: Dna, skin: int) -> Surface:
 
     Args:
         dna: the face.
-        skin: the index of its mesh.
+        skin: the index of the skin mesh.
     """
     size = mm_of(dna) / UNITS["cm"]
     points = np.asarray(dna.meshes[skin].positions, np.float64)

@@ -26,9 +26,9 @@ _CELL = 0.4  # smoothing radii: edge length of the grid cells whose vertices are
 _STEADY = 1e-6  # weight of the whole head's transform, which keeps the systems regular
 _NORMAL = 0.25  # weight of the normal; edges do not measure the stretch along it
 _AT_ONCE = 1024  # vertices that are smoothed together
-# A point is bound to the skin point with the same texture coordinates if that is at most _LONGER
-# times as far away as the closest skin point, plus _BESIDE times the smoothing radius. _SAME_TEXEL:
-# largest UV distance at which texture coordinates count as the same.
+# A point is bound to the skin point with the same texture coordinates if the distance to it is at
+# most _LONGER times the distance to the closest skin point, plus _BESIDE times the smoothing
+# radius. _SAME_TEXEL: largest UV distance at which texture coordinates count as the same.
 _LONGER, _BESIDE, _SAME_TEXEL = 2.0, 0.2, 2e-3
 _NO_TEXTURE = 1e-6  # texture coordinates with a smaller extent are unusable
 _TURNED = 0.5  # a rotation counts if it leaves at most this share of the RMS difference
@@ -51,11 +51,11 @@ class Similar:
 
     @property
     def size(self) -> float:
-        """The scale factor."""
+        """The factor by which the transform scales lengths."""
         return float(np.cbrt(max(np.linalg.det(self.linear), 0.0)))
 
     def __call__(self, points: Doubles) -> Doubles:
-        """Transform points: float64[n, 3] -> float64[n, 3]."""
+        """float64[n, 3]: points of the source head, transformed to the target head."""
         return self.becomes + (points - self.middle) @ self.linear.T
 
 
@@ -212,7 +212,7 @@ class Change:
         return triangle, np.where(triangle[:, None] >= 0, np.asarray(places), none[1])
 
     def sees(self, points: Doubles, ways: Doubles, far: float) -> npt.NDArray[np.bool_]:
-        """bool[n]: True if a ray from a skin point hits no skin of the source head.
+        """bool[n]: for each ray from a skin point, True if it hits no skin of the source head.
 
         Args:
             points: float64[n, 3], on the skin.
@@ -272,7 +272,8 @@ def turn_of(before: Doubles, after: Doubles) -> tuple[Doubles, float]:
     """The rotation (float64[3, 3]) and the scale from the whole source head to the target head.
 
     If only the chin is longer, a small rotation already fits better, although the head is not
-    rotated. A rotation is therefore returned only if it explains most of the difference.
+    rotated. So the fitted rotation is returned only if it removes more than half of the RMS
+    difference of the vertex positions; otherwise the identity is returned.
 
     Args:
         before, after: float64[n, 3], vertex positions on the source and the target head.
@@ -298,7 +299,7 @@ def _flat(coordinates: Doubles) -> Doubles:
 
 
 def _sums(rows: Ints, values: Doubles, count: int) -> Doubles:
-    """float64[count, ...]: for each number in `rows`, the sum of the values with this number."""
+    """float64[count, ...]: row r is the sum of all values[i] with rows[i] = r."""
     flat = values.reshape(len(values), -1)
     out = np.empty((count, flat.shape[1]))
     for k in range(flat.shape[1]):

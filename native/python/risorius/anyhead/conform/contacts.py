@@ -36,8 +36,9 @@ _SEEN = 0.001  # smoothing radii: shorter deltas are not added to a blend shape
 # _MOST: largest fraction of a joint motion that is added to it or removed from it. _FEW: a control
 # with fewer contacts is not corrected.
 _MOST, _FEW = 0.8, 8
-# In smoothing radii: largest delta of one step, and the standard deviation of the Gaussian by which
-# deltas fade out with the distance from the closest contact.
+# _LARGEST: largest displacement that one step adds to a blend shape, in smoothing radii. _FADES:
+# standard deviation, in smoothing radii, of the Gaussian by which these displacements fade out with
+# the distance from the closest contact.
 _LARGEST, _FADES = 0.15, 0.5
 _OVERLAP = 1.5  # standard deviations of the gaps: overlap of the lids that the joints aim at
 _LIDS = 1.7  # radii of an eye: skin within this distance of the eye's centre is a lid
@@ -71,14 +72,19 @@ class _Posed:
         self.rest = np.asarray(self._probe.positions(self.raw()), np.float64)
 
     def raw(self, control: int = -1) -> npt.NDArray[np.float32]:
-        """float32[R]: raw controls of the rest pose, with one at 1 if its index is given."""
+        """float32[R]: the raw controls of the rest pose. The control of index `control` is at 1 if
+        the index is 0 or more."""
         out = np.array(self.rig.initial_raw_controls, np.float32)
         if control >= 0:
             out[control] = 1
         return out
 
     def at(self, control: int) -> Doubles:
-        """float64[V, 3]: vertex positions with one control at 1."""
+        """float64[V, 3]: vertex positions of the skin with one control at 1.
+
+        Args:
+            control: index of the raw control; the others have their values of the rest pose.
+        """
         return np.asarray(self._probe.positions(self.raw(control)), np.float64)
 
 
@@ -131,7 +137,8 @@ def keep_contacts(
 
 
 def _touch(face: _Posed, control: int, change: Change, lids: npt.NDArray[np.bool_]) -> Touch | None:
-    """The lid contacts of a control; None if there are too few."""
+    """The contacts of the lids at the value 1 of a control; None if there are fewer than _FEW
+    (8)."""
     posed = face.at(control)
     far = np.linalg.norm(posed - face.rest, axis=1)
     moving = np.flatnonzero(lids & (far > _FAR * change.reach))
@@ -190,10 +197,11 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
 
 
 def _nearer(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V, 3]: motion that each vertex needs in addition; None if there is no gap.
+    """float64[V, 3]: displacement to add to each vertex so that the lids meet; None if there is no
+    gap.
 
     The gap is divided between both lids in proportion to their motion by the control. The
-    correction fades out behind the rims.
+    displacements fade out with the distance from the closest contact.
     """
     posed = face.at(control)
     ways = posed - face.rest
@@ -227,15 +235,28 @@ def _moving(ways: Doubles, change: Change) -> Ints:
 
 
 def _around(points: Doubles, places: Doubles, reach: float) -> tuple[Doubles, Doubles]:
-    """float64[n, m]: Gaussian weights of the contacts at each point; float64[n]: the squared
-    distance of the closest contact."""
+    """float64[n, m]: Gaussian weights of the m contacts at each of n points; float64[n]: the
+    squared distance of each point from its closest contact.
+
+    Args:
+        points: float64[n, 3].
+        places: float64[m, 3], positions of the contacts.
+        reach: standard deviation of the Gaussian.
+    """
     apart = ((points[:, None] - places) ** 2).sum(axis=2)
     near = apart.min(axis=1)
     return np.exp(-(apart - near[:, None]) / (2 * reach**2)), near
 
 
 def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna | None:
-    """The face with scaled joint motions of a control; None if the control moves no joint."""
+    """The face with scaled joint motions of a control; None if the control moves no joint.
+
+    Args:
+        face: the face.
+        control: index of the raw control.
+        more: float64[V], fraction by which the motion of each vertex must grow. Each joint grows
+            by the mean fraction of its vertices, weighted by their skin weights.
+    """
     dna = face.dna
     vertex, joint, weight = sk.skin_entries(dna.meshes[face.skin])
     held = np.bincount(joint, weights=weight, minlength=len(dna.joint_names))
@@ -264,7 +285,16 @@ def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna 
 def _shapes_go_on(
     face: _Posed, control: int, ways: Doubles, holds: Mapping[int, Hold], change: Change
 ) -> Dna | None:
-    """The face with deltas added to the blend shapes of a control; None if the control has none."""
+    """The face with displacements added to the blend shapes of a control; None if the control has
+    none.
+
+    Args:
+        face: the face.
+        control: index of the raw control.
+        ways: float64[V, 3], the displacements to add to the posed skin.
+        holds: bindings of the meshes that follow the skin, by mesh index.
+        change: the deformation of the skin.
+    """
     dna = face.dna
     channels = dna.blend_shape_channels
     driven = np.asarray(channels.output_indices)[np.asarray(channels.input_indices) == control]
@@ -304,7 +334,16 @@ def _longer(
     change: Change,
     motions: Doubles,
 ) -> _native.BlendShapeTarget:
-    """The blend shape target with deltas added, so that the posed skin moves by `ways`."""
+    """The blend shape target with displacements added, so that the posed mesh moves by `ways`.
+
+    Args:
+        mesh: the mesh of the target.
+        target: the blend shape target; it is not changed.
+        ways: float64[V, 3], displacements of the vertices of the posed skin.
+        hold: the binding of the mesh to the skin; None: the mesh is the skin.
+        change: the deformation of the skin.
+        motions: float64[J, 3, 3], the result of _motions.
+    """
     if hold is None:
         way = ways
     else:

@@ -102,7 +102,8 @@ def mouth_of(jaw: JawChange, turn: Doubles) -> Similar:
 def joint_shifts(
     dna: Dna, joint: int, jaw: JawChange, turn: Doubles, places: tuple[Doubles, Doubles]
 ) -> Doubles:
-    """float64[columns, 3]: the jaw joint's translation on the target head by each input at 1.
+    """float64[columns, 3]: the jaw joint's translation on the target head, for each input alone at
+    the value 1.
 
     The columns are the inputs of the joint matrix; translations are in world axes, in file units.
 

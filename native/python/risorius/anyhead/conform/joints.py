@@ -168,11 +168,12 @@ def shifts_carried(dna: Dna, places: Places, turn: Doubles, stiff: Stiff) -> lis
 
 
 def _set_shifts(groups: Sequence[JointGroup], joint: int, shifts: Doubles) -> None:
-    """Write translation columns of a joint; a column that two joint groups have is written once.
+    """Write the translation columns of a joint. If two joint groups have the same column of the
+    joint, the first group gets the translation and the second group gets zeros.
 
     Args:
-        groups: copies, changed in place.
-        joint: its index.
+        groups: copies of the face's joint groups, changed in place.
+        joint: index of the joint.
         shifts: float64[columns, 3], translations in the axes of the joint's parent.
     """
     left = shifts.copy()

@@ -23,7 +23,8 @@ from .change import Change, Similar, similar
 _ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
 _MOUTH = re.compile(r"saliva", re.IGNORECASE)
 _INNER = 0.35  # radii of an eye: joints closer to the eye's centre move with the eye
-# Distance of the lid rims from the centre of an eye, and its standard deviation, in radii.
+# In radii of the eye: distance of the lid rims from the eye's centre, and the standard deviation of
+# this distance.
 _RIM, _BAND = 1.1, 0.03
 _STIFF = 0.9  # a vertex moves with the eye if the eye's joints have more of its skin weights
 _PRIOR = 0.01  # weight of the surrounding skin against the distance of the lid rims
@@ -209,9 +210,9 @@ def _in_ball(way: Similar, radius: float, balls: Sequence[Ball]) -> Similar:
 def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
     """The transform that keeps the distance between the eyeball and the lid rims in proportion.
 
-    The rims are a narrow band of a sphere and determine its centre well. Its radius needs the
-    transform of the surrounding skin as a prior. That transform is returned if fewer than 12
-    vertices of the rims are visible.
+    The rims are a narrow band of a sphere, so they determine the centre of the sphere well but not
+    its radius. The transform of the skin around the eye is therefore used as a prior, and is
+    returned unchanged if fewer than 12 vertices of the rims are visible.
     """
     start = change.around(middle, radius)
     away = change.before.points - middle

@@ -18,17 +18,18 @@ from .parts import finest, skin_of
 
 _AS_IT_IS = 2.0  # a head up to twice as large or small has the unit of the face
 _LEANS = np.cos(np.radians(30.0))  # cosine of the largest angle of a head to the axes of its file
-# Triangulations of polygons with more corners are not recognised; polygons with more corners in the
-# other mesh are accepted without a comparison.
+# Largest number of corners of a polygon that is compared. A triangulated polygon with more corners
+# is not recognised; a polygon of the other mesh with more corners is accepted without a comparison.
 _FIVE = 5
 
 
 def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
     """float64[V, 3] by mesh name: vertex positions in the head, for each LOD 0 mesh with a match.
 
-    A mesh matches if has_polygons_of() is true. If several meshes match, such as both eyes, the
-    mesh whose name has the longest common beginning is taken, then the first. A mesh of the head is
-    taken only once.
+    A mesh of the head matches if has_polygons_of() is true. If several meshes of the head match,
+    such as both eyes, the mesh is taken whose name has the longest common beginning with the name
+    of the face's mesh; of equally similar names, the first. A mesh of the head is taken only
+    once.
 
     Args:
         dna: the face.
@@ -74,14 +75,15 @@ def into_own_space(
 ) -> tuple[dict[str, Doubles], str]:
     """Convert a sculpt to the axes and the unit of a face.
 
-    A sculpt in the axes and the unit of the face is returned unchanged. Another one is rotated,
-    see turn_back(), and scaled. The second value is a sentence about the conversion, "" for none.
+    A sculpt in the axes and the unit of the face is returned unchanged. Any other sculpt is rotated
+    by the result of turn_back() and scaled. The second value is a sentence about the conversion;
+    it is "" if the sculpt is unchanged.
 
     Args:
         dna: the face.
         moved: float64[V, 3] by mesh name; the skin is required.
-        factor: the scale; None: 1 for a head up to twice as large or small as the face, else the
-            ratio of two units that fits best.
+        factor: the scale; None: 1 if the sizes of the head and the face differ by a factor below
+            2, else the ratio of two units that fits best.
     """
     skin = skin_of(dna)
     before = np.asarray(dna.meshes[skin].positions, np.float64)
@@ -113,7 +115,7 @@ def turn_back(turn: Doubles) -> Doubles:
 
 
 def right_angles() -> list[Doubles]:
-    """The 24 rotations by right angles, the identity first."""
+    """float64[3, 3] each: the 24 rotations that map axes to axes, the identity first."""
     out = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):

@@ -208,9 +208,13 @@ class Eyelids:
     ) -> Doubles:
         """The points with the edges of both lids turned towards each other.
 
-        apart: the result of _apart. rest_up: float64[n], each vertex's angle up in the rest pose,
-        in radians: the upper lid's rotation since the rest pose is scaled first (see _scaled);
-        None: `_fade` distributes the whole rotation.
+        Args:
+            points: float64[n, 3], the lid vertices in a pose.
+            turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
+            apart: the result of _apart.
+            rest_up: float64[n], each lid vertex's angle up in the rest pose, in radians; with it
+                the upper lid's rotation since the rest pose is multiplied by a factor first. None:
+                every lid vertex rotates by a fraction of its edge's rotation, the result of _fade.
         """
         frame = self.opening.frame
         across, up, away = frame.angles(points)
@@ -322,9 +326,19 @@ class Eyelids:
         turn: Doubles | None,
         wanted: Doubles,
     ) -> Doubles:
-        """float64[n]: the angles, in radians, by which vertices of the upper lid rotate down so
-        that its edge rotates down by `wanted`. The lid's rotation by the expression is scaled
-        first; `_fade` distributes the remaining angle.
+        """float64[n]: the angles, in radians, by which the lid vertices rotate down so that the
+        edge of the upper lid rotates down by `wanted`.
+
+        First, the lid's rotation by the expression is multiplied by a factor. The factor has
+        limits, so an angle may remain; each vertex then rotates by a fraction of this angle, the
+        result of _fade.
+
+        Args:
+            across: float64[n], angle across of each lid vertex, in radians.
+            turned: float64[n], rotation of each vertex up since the rest pose, in radians.
+            points: float64[n, 3], the lid vertices in the pose.
+            turn: float64[3, 3], the eye's rotation from its rest pose; None: not rotated.
+            wanted: float64[columns], angle by which the edge must rotate down, in radians.
         """
         columns = self.opening.across
         high = self._edge(points, turn)
@@ -367,12 +381,10 @@ class Eyelids:
         far[column[best]] = ((1 - s) * away[a] + s * away[b])[best]
         return out, far
 
-    def _lacks(
-        self, points: Doubles, turn: Doubles | None, above: float, bare: Mask | None = None
-    ) -> Doubles:
-        """float64[n]: distance by which the triangles of each vertex must move outwards to be
-        `above` away from the eye's surface. Only triangles that are outside the eye in the rest
-        pose count, and in the columns `bare` (see _apart) also triangles just below its surface."""
+    def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
+        """float64[n]: distance by which each lid vertex must move outwards, so that all of its
+        triangles are at least the distance `above` from the eye's surface; 0 if they already are.
+        Only triangles that are outside the eye in the rest pose count."""
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
         tree = self._posed(points)
         rays = self._looks
@@ -391,10 +403,11 @@ class Eyelids:
             np.maximum.at(lacks, corners[hit, k], lack)
         return lacks
 
-    def _lifted(self, points: Doubles, turn: Doubles | None, bare: Mask | None = None) -> Doubles:
-        """The points; those too near to the eye are moved away from the eye's centre.
+    def _lifted(self, points: Doubles, turn: Doubles | None) -> Doubles:
+        """float64[n, 3]: the points of the lids, lifted out of the eye. Points that are too near to
+        the eye's surface, or below it, are moved away from the eye's centre.
 
-        Neighbours of the moved points move too, with a smooth fall-off.
+        Points near these points are lifted too, with a smooth fall-off.
 
         Args:
             points: float64[n, 3], the vertices of the lids in a pose.
@@ -421,7 +434,8 @@ class Eyelids:
         return np.asarray(points + lift[:, None] * ray)
 
     def _spread(self, need: Doubles) -> Doubles:
-        """float64[n]: heights by which vertices are lifted; `need` with a smooth fall-off."""
+        """float64[n]: heights by which the lid vertices are lifted. A vertex is lifted by at least
+        its height in `need`; vertices near it are lifted too, with a smooth fall-off."""
         lift = need.copy()
         a, b = self._edges.T
         count = np.bincount(a, minlength=len(lift)) + np.bincount(b, minlength=len(lift))

@@ -76,9 +76,10 @@ class Opening:
 
     Attributes:
         frame: axes at the eye's centre; `across` is parallel to the line between the eye corners.
-        across: float64[columns], angles from corner to corner in radians, ascending; at most
-            COLUMNS.
-        low, high: float64[columns], angles of the lower and the upper lid's edge in radians.
+        across: float64[columns], angle across of each column from corner to corner, in radians,
+            ascending; there are at most COLUMNS (48) columns.
+        low, high: float64[columns], angle up of the lower and of the upper lid's edge in each
+            column, in radians.
     """
 
     frame: Frame
@@ -153,9 +154,13 @@ def _seen(tree: ClosestPoints, ball: Eyeball, rays: Doubles, turn: Doubles | Non
 
 
 def _between_lids(seen: Mask) -> Mask | None:
-    """The largest region of free rays that does not reach the border of the searched grid; a region
-    at the border lies outside the lids. Erosion first cuts leaks through holes of a scan. None if
-    no region is large enough."""
+    """The largest region of free rays that does not reach the border of the searched grid, because
+    a region at the border lies outside the lids. Before the search the free rays are eroded, which
+    separates the opening from holes of a scan. None if no region is large enough.
+
+    Args:
+        seen: bool[columns, rows], whether a ray hits no lid.
+    """
     core = seen
     for cuts in range(_CUTS):
         core = core & _beside(core, np.minimum.reduce)
@@ -184,7 +189,12 @@ def _regions(core: Mask) -> Ints:
 
 
 def _beside(values: npt.NDArray[Any], of: Callable[..., Any]) -> npt.NDArray[Any]:
-    """The minimum or maximum (`of`) of each cell and its four neighbours."""
+    """For each cell of a grid, the minimum or the maximum of the cell and its four neighbours.
+
+    Args:
+        values: the grid, two-dimensional.
+        of: np.minimum.reduce or np.maximum.reduce, applied to a list of five shifted grids.
+    """
     padded = np.pad(values, 1, mode="edge")
     return np.asarray(
         of([padded[1:-1, 1:-1], padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:],
@@ -208,11 +218,15 @@ def _turned(frame: Frame, across: Doubles, up: Doubles, blob: Mask) -> Frame:
 def _refined(
     tree: ClosestPoints, ball: Eyeball, frame: Frame, columns: Doubles, bounds: Doubles
 ) -> Opening | None:
-    """The lid edges of each column, bisected to a hundredth of a degree; None if the second search
-    finds no free ray.
+    """The opening with finer columns than a coarse search found. The lid edges of each column are
+    bisected to a hundredth of a degree. None if no ray between the coarse edges is free.
 
-    columns: angles across of the first search. bounds: float64[n, 2], lowest and highest free angle
-    of each column. All in radians.
+    Args:
+        tree: the skin near the eye.
+        ball: the eye.
+        frame: axes at the eye's centre.
+        columns: float64[n], angles across at which the coarse search found the opening, radians.
+        bounds: float64[n, 2], lowest and highest angle of a free ray of each column, radians.
     """
     step = np.radians(_STEP)
     ends = columns[[0, -1]] + [-step / 2, step / 2]

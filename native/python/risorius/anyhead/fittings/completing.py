@@ -31,8 +31,9 @@ from .template_parts import template_parts
 Mask = npt.NDArray[np.bool_]
 _RIM = 1.5  # mm from the edge of a lid: width of the rim that touches the eye
 _PATCH = 40  # skin vertices that determine the place of a lash
-# An eye is painted or closed if the area of its opening, or the distance between its lids relative
-# to their width, is below these fractions of the template's.
+# An eye counts as painted or closed if the area of its opening is at most _SEEN times the area on
+# the template, or if the distance between its lids, divided by their width, is below _OPENED times
+# this quotient on the template.
 _SEEN = 0.3
 _OPENED = 0.45
 _AROUND = 2.5  # cm around the teeth: skin that determines their place

@@ -24,7 +24,8 @@ class Fitted:
     """A mesh of a head.
 
     Attributes:
-        kind: EYE, TEETH and so on; SKIN is a mesh that lies on the skin, such as a tear line.
+        kind: the kind of the mesh, such as EYE or TEETH. SKIN is the kind of a mesh that lies on
+            the skin, such as a tear line.
         part: the mesh; `part.shapes` has its displacements by expression, if they are known.
         side: "L" or "R" for eyes, else "".
         hangs: HEAD or JAW, the bone of a rigid mesh in the mouth; "" for others.
@@ -38,7 +39,7 @@ class Fitted:
     own: bool = True
 
     def surface(self) -> Surface:
-        """The mesh as triangles."""
+        """The mesh `part` with its polygons divided into triangles."""
         return Surface.of_polygons(self.part.mesh.positions, self.part.mesh.faces)
 
 
@@ -62,7 +63,7 @@ class Fittings:
         """The meshes of some kinds.
 
         Args:
-            kinds: EYE, TEETH and so on.
+            kinds: kinds of meshes, such as EYE or TEETH.
         """
         return [row for row in self.rows if row.kind in kinds]
 

@@ -106,8 +106,8 @@ def eyeball_of(eye: Eye) -> Eyeball:
 
 
 def _pieces(part: HeadPart, eyes: Sequence[Eye]) -> list[HeadPart]:
-    """The islands of a mesh, the island most likely to be the face first; a mesh with a known name
-    stays whole."""
+    """The islands of a mesh as meshes; the island that is most likely the face is the first. A mesh
+    whose name shows its kind, such as "teeth", stays whole."""
     if _named(part.name) is not None:
         return [part]
     labels = islands_of(part.mesh)
@@ -230,13 +230,16 @@ def _by_place(piece: HeadPart, place: _Place) -> str:
 
 
 def _is_flat(points: Doubles) -> bool:
-    """Whether the smallest extent is below 0.6 of the largest, as of lashes but not of a shell."""
+    """Whether the smallest side of the bounding box is below 0.6 of its largest side. Lashes are
+    flat in this sense; a shell around an eyeball is not."""
     extent = np.sort(np.ptp(points, axis=0))
     return bool(extent[0] < 0.6 * extent[2])
 
 
 def _joined(pieces: Sequence[HeadPart], kind: str) -> HeadPart:
-    """Islands of a mesh, joined into one mesh."""
+    """Islands of a mesh that have the same kind, joined into one mesh. The result keeps the name of
+    the mesh if there is a single island and the name shows the kind. Otherwise lashes, brows,
+    teeth, tongue and gums are named after their kind."""
     first = pieces[0]
     name = first.name if len(pieces) == 1 and _named(first.name) else _called(first, kind)
     if len(pieces) == 1:

@@ -22,7 +22,8 @@ def template_parts(dna: Dna) -> tuple[int, list[HeadPart]]:
     """All meshes of LOD 0 in cm, y up, the face towards +z, and before them the index of the skin
     among these meshes.
 
-    Only shapes that do not follow from the skin are kept: tongue, lashes and pupils.
+    The parts keep only expressions in which a mesh does not simply follow the skin: all that move
+    the tongue, the controls of the lashes for lashes, and the controls of the pupils for eyes.
 
     Args:
         dna: a face with geometry.

@@ -299,7 +299,8 @@ class _System:
             self.right -= (ways[:, k] * amount[:, None]).T @ away[:, k]
 
     def _ways(self, used: Ints) -> Doubles:
-        """float64[n, 3, size]: derivatives of the vertex positions by each unknown."""
+        """float64[n, 3, unknowns]: derivatives of the positions of the vertices `used` by each
+        unknown of the system."""
         points, form = self.shaped[used], self.form
         turn = np.cross(np.eye(3)[None], points[:, None])  # [n, axis, 3]
         out = [turn.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (len(used), 3, 3))]

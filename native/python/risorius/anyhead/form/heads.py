@@ -82,7 +82,7 @@ class HeadForm:
 
 @cache
 def head_form() -> HeadForm:
-    """The model in the data file of this package."""
+    """The statistical head model, loaded from the data file of this package."""
     data = files(__package__).joinpath(FILE_NAME).read_bytes()
     with np.load(io.BytesIO(data), allow_pickle=False) as packed:
         form = packed["form"] * packed["form_scale"][:, None, None]

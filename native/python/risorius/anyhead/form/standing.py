@@ -20,7 +20,8 @@ _SHARES = (1.0, 0.72, 0.5, 0.32, 0.2, 0.13)  # tried heights of the head / heigh
 _PLACED, _KEPT, _TRIED = 48, 10, 3  # number of guesses that each stage keeps
 _WORSE = 1.6  # guesses with an error above this multiple of the least error are dropped
 _OBLIQUE = 48  # number of rotations of `oblique`
-# cm of the model: largest Standing.error of a certain head, and of a possible one
+# In cm of the model. A head whose Standing.error is at most SURE was found with certainty; above
+# NO_FACE, no face was found.
 SURE, NO_FACE = 0.13, 0.21
 # Cells of a grid along the longest side of a surface. The first grid with which the coarsened
 # surface has at most _CELLS vertices is used, otherwise the last grid.

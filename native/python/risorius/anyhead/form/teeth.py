@@ -124,10 +124,10 @@ def _teeth(used: Ints, points: Doubles) -> tuple[Doubles, Doubles]:
 def shown_by(told: JawChange, before: Doubles, after: Doubles) -> JawChange:
     """The predicted change of the jaw, corrected by the lower teeth of both heads.
 
-    The bounding boxes of the teeth give the place. The size is the geometric mean of the predicted
-    size and the size by width and depth of the boxes; their height is not used, because it does not
-    depend on the jaw. Teeth that differ too much from the prediction are a different kind of model,
-    so the prediction is returned.
+    The bounding boxes of the teeth give the position of the jaw. Its size is the geometric mean of
+    the predicted size and the size by width and depth of the boxes; the height of the boxes is not
+    used, because it does not depend on the jaw. Teeth that differ too much from the prediction are
+    a different kind of model, so the prediction is returned unchanged.
 
     Args:
         told: the change that the head model predicts from the skin.

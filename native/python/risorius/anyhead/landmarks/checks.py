@@ -12,10 +12,11 @@ from ..surface import Surface
 from .marks import LandmarkError
 
 LEAST, MOST = 200, 1_000_000  # smallest and largest number of vertices of a head
-# Border vertices count as in a plane if they are within this fraction of the longest side of the
-# mesh's bounding box.
+# A border vertex counts as lying at a side of the mesh's bounding box if its distance from the side
+# is below this fraction of the longest side.
 _FLAT = 0.02
-# A mesh was cut at a side of its bounding box if this fraction of its border vertices is there.
+# A mesh counts as cut at a side of its bounding box if at least this fraction of its border
+# vertices lies at the side.
 _CUT = 0.3
 _DEEP = 0.12  # cm of the model: least depth of a step between the lids that counts as an opening
 _ROWS, _COLUMNS = 25, 5  # grid of rays through an eye

@@ -57,7 +57,8 @@ class Found:
     Attributes:
         landmarks: the landmarks of the head.
         pose: the head model fitted to the head.
-        error: error of the fit in cm of the model, see form.standing.Standing.
+        error: error of the fit in cm of the model, the attribute `error` of
+            form.standing.Standing; a well fitted head has at most 0.13.
         lips_apart: whether the lips are separate; connected lips cannot open.
     """
 
@@ -197,7 +198,8 @@ def _at_begin(tell: Progress) -> Progress:
 
 
 def _at_end(tell: Progress) -> Progress:
-    """Progress of work that is rarely necessary: it reports 1.0 always, and can be stopped."""
+    """The progress function of extra work after the usual work. It always reports 1.0 to `tell`,
+    because the extra work is rarely necessary; `tell` can stop the work."""
     return lambda _share: tell(1.0)
 
 

@@ -35,7 +35,7 @@ class Landmarks:
 
     Attributes:
         points: float64[3] by landmark name, positions.
-        how: FOUND or MOVED for each point.
+        how: landmark name -> FOUND (the program found the point) or MOVED (the user moved it).
         notes: sentences for the user.
     """
 

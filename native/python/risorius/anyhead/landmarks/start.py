@@ -32,7 +32,8 @@ _AS_TEMPLATE = (  # a fit of the model that has the template's surface
     Step(8, 0.3, 4000, _ALL_PARTS, 0.4, 0.5, noise=0.04),
 )
 _ON = 1.0  # cm of the form: farthest place of the template that a vertex of the form is moved to
-# cm of the form: if the place is this far away, the vertex moves by 1/e of the distance
+# cm of the form: a vertex of the form at this distance from its place on the template moves by 1/e
+# of the distance, a nearer vertex by more of it, and a farther vertex by less.
 _SURE = 0.6
 _HELD = 30.0  # weight of a landmark that the user moved, against a pair in the middle of the face
 
@@ -67,8 +68,9 @@ def start_of(
 
 
 def _like(seen: Target, pose: Pose) -> HeadForm:
-    """The model with another mean: with the weights of the pose, its vertices lie on the surface,
-    except vertices that are too far from it (see _ON and _SURE).
+    """The model with another mean: with the weights of the pose, its vertices lie on the surface.
+    The farther a vertex is from the surface, the smaller is the part of the way that it moves; a
+    vertex farther than 1 cm does not move.
 
     So a later fit to another head compares the two surfaces. Details of the first surface that the
     model cannot represent are then in the mean, and do not count as a difference.
@@ -89,8 +91,9 @@ def _by_hand(name: str, one: Found, other: Found) -> bool:
 
 
 def _moved(one: Found, other: Found) -> Held | None:
-    """The landmarks that the user moved on either head, at their places on the second head; None if
-    there are none that both heads and the model have."""
+    """The landmarks that the user moved on one of the heads or on both, with their positions on the
+    head `other`. Only landmarks that both heads and the model have count; None if there are
+    none."""
     places = head_form().places
     names = [n for n in common(one, other) if n in places and _by_hand(n, one, other)]
     if not names:

@@ -142,7 +142,8 @@ class Contacts:
         return out
 
     def _edges_near_teeth(self) -> Ints:
-        """int64[E, 2]: edges between vertices near teeth and gums, as indices in `_near`."""
+        """int64[E, 2]: edges between vertices near teeth and gums. The numbers are indices into
+        self._near, the list of these vertices."""
         place = np.full(len(self.skin.points), -1)
         place[self._near] = np.arange(len(self._near))
         edges = place[self.skin.edges()]
@@ -171,7 +172,8 @@ class Contacts:
         return SkinFaults(depth, itself.stretch, itself.fold)
 
     def _areas(self, points: Doubles, own: Ints) -> Doubles:
-        """float64[polygons]: twice the area of each polygon. Only its triangles in `own` count."""
+        """float64[polygons]: twice the area of each polygon. Only triangles with an index in `own`
+        are added up."""
         a, b, c = (points[self.skin.triangles[own, k]] for k in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         if self._face_of is None:
@@ -194,7 +196,7 @@ class Contacts:
 
     def _seen(self, vertices: Ints) -> Mask:
         """bool[n]: whether a vertex is visible from at least 3 of 15 directions in front of the
-        face, or within two rings of such a vertex."""
+        face, or at most two edges shorter than 0.2 cm away from such a vertex."""
         points, normals = self.skin.points, self.skin.normals()[vertices]
         triangles = np.ascontiguousarray(self.skin.triangles, np.int32)
         tree = ClosestPoints(points, triangles)
@@ -218,8 +220,13 @@ class Contacts:
         return self._depths(points, posed)[0]
 
     def _depths(self, points: Doubles, posed: list[Doubles]) -> tuple[Doubles, Doubles]:
-        """float64[n]: depths of points inside the solids, 0 outside; float64[n, 3]: unit directions
-        to the outside."""
+        """float64[n]: depths of points inside teeth and gums, 0 outside; float64[n, 3]: unit
+        directions from the points to the outside, 0 for a point outside.
+
+        Args:
+            points: float64[n, 3], the points.
+            posed: the result of Bodies.posed, the vertices of teeth and gums in the pose.
+        """
         deepest, out = np.zeros(len(points)), np.zeros((len(points), 3))
         if not len(points):
             return deepest, out

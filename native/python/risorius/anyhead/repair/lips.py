@@ -20,7 +20,8 @@ from ...base.easing import smooth_step
 from ..surface import Surface
 
 _ROUND = ("mouthLipsPurse", "mouthFunnel", "mouthPucker")  # prefixes of controls that move the lips
-# Least motion of a lip vertex by the controls of _ROUND together, as a fraction of the largest.
+# A vertex is a lip vertex if the controls of _ROUND together move it by more than this fraction of
+# the largest motion of a vertex.
 _LIP = 0.25
 # Largest motion of an upper lip vertex and least motion of a lower lip vertex by jawOpen, as
 # fractions of the motion that 90 % of the lip vertices do not exceed.
@@ -30,7 +31,8 @@ _WIDTH_MM = 50.0  # width of a human mouth; lengths in mm below are scaled to th
 _RIM = 1.2  # mm beyond the nearest vertex of a column that still belong to the rim
 _FADE = 14.0  # mm from the rim along the skin: vertices beyond keep their place
 _BAND = 2.5  # mm from the rim along the skin: vertices up to here move with the rim
-# Fraction of the mouth's width: columns are not this close to a corner, where lips may be joined.
+# Fraction of the mouth's width: distance of the outermost columns from the corners of the mouth,
+# because the lips may be joined at the corners.
 _CORNER = 0.08
 _TOUCH = 0.8  # mm: lips touch in the rest pose if their gap is below half of it
 _SPACING = 0.7  # mm between samples: less than the width of a column
@@ -48,7 +50,8 @@ _NEAR = 3.0  # mm: a point that is deeper counts as outside
 
 @dataclass(frozen=True)
 class Meeting:
-    """The gap between the lips in a pose, by column from the right mouth corner to the left one.
+    """The gap between the lips in a pose, for each of COLUMNS (40) columns, from the right to the
+    left corner of the mouth.
 
     Attributes:
         gap: float64[COLUMNS], in the target's unit, negative if the lips intersect; all NaN if no
@@ -182,7 +185,8 @@ class Lips:
         return float(np.nan_to_num(self.meeting(points).gap).max(initial=0.0))
 
     def deepest(self, points: Doubles) -> float:
-        """By how much one lip is at most deeper in the other than in the rest pose, target's unit.
+        """The largest depth of one lip in the other, minus the depth at the same column in the rest
+        pose, in the target's unit; 0 if no column is deeper than in the rest pose.
 
         Args:
             points: float64[V, 3], vertex positions of the posed target.
@@ -231,7 +235,8 @@ class Lips:
         return best
 
     def _wrong(self, meeting: Meeting) -> Doubles:
-        """float64[COLUMNS]: distance by which the lips have to approach, negative: to part."""
+        """float64[COLUMNS]: distance by which the lips have to approach each other in each column;
+        negative if they have to move apart, 0 if their gap is right."""
         gap = np.nan_to_num(meeting.gap)
         deepest = np.fmin(np.nan_to_num(self.rest.gap), -_DEEP * self.mm)
         far = np.where(gap > 2 * _GOAL * self.mm, gap - _GOAL * self.mm, 0.0)
@@ -243,7 +248,8 @@ class Lips:
         return np.arctan2(arm[:, 0], arm[:, 2])
 
     def _column(self, points: Doubles) -> Ints:
-        """int64[n]: the column of each point, -1: none."""
+        """int64[n]: the index of the column in which each point lies; -1 for a point that lies
+        outside all columns."""
         at = np.searchsorted(self._edges, self._around(points)) - 1
         return np.where((at >= 0) & (at < COLUMNS), at, -1)
 
@@ -359,7 +365,13 @@ def _along(skin: Surface, begin: Ints, farthest: float) -> Doubles:
 
 
 def _straight(ways: Doubles, weights: Doubles, rounds: int) -> Doubles:
-    """float64[COLUMNS, 3]: unit directions, smoothed over neighbouring columns by their weights."""
+    """float64[COLUMNS, 3]: unit directions, smoothed over neighbouring columns.
+
+    Args:
+        ways: float64[COLUMNS, 3], the directions.
+        weights: float64[COLUMNS]; the size of a weight is the influence of its column.
+        rounds: number of smoothing rounds; each averages a column with its two neighbours.
+    """
     out = np.abs(weights)[:, None] * ways
     for _ in range(rounds):
         wide = np.pad(out, ((1, 1), (0, 0)), mode="edge")

@@ -130,8 +130,8 @@ def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose,
 def _together(
     pose: Pose, expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]
 ) -> Doubles:
-    """float64[V, 3]: the displacements of a pose, summed from its controls and from the correctives
-    of pairs of these."""
+    """float64[V, 3]: the displacements of a pose: the sum of the displacements of its controls and
+    of the correctives of each pair of its controls."""
 
     def alone(name: str) -> Doubles:
         return np.asarray(expressions.get(name, 0.0), np.float64)

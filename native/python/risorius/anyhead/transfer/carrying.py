@@ -3,7 +3,8 @@
 
 Vertices that the jaw moves are rotated by the same angle as on the template, about the hinge of the
 other head's jaw. The remaining motion is transformed by the deformation gradients between both
-heads. Both are softened: the motions of similar heads are more alike than the heads.
+heads. Small size differences between the heads change the motions only in part, because the motions
+of similar heads are more alike than the heads.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from .template import Pose, TemplateFace, left_over
 
 _REST = 0.05  # cm: vertices that the jaw moves less count as not moved by it
 _FLESH = 0.1  # relative size difference up to which soft tissue explains it, not the bone
-# Least exponent of a small change of size for the motion of skin and for the shift of the jaw.
+# Exponents for small size differences between the heads: a stretch near 1 is raised to this power
+# before it scales the motion of the skin, or the translation of the jaw.
 _OF_SKIN, _OF_JAW = 0.6, 0.75
 _OPENS, _CLOSES = ("jawOpen",), ("mouthClose",)  # mouthClose closes the lips of an open jaw
 _SPURIOUS = 0.002  # cm: a corrective fades out where the template's corrective is smaller
@@ -119,10 +121,12 @@ class Carrying:
         way = ways[pose].astype(np.float64)
         turns = {} if self._face.jaw is None else self._face.jaw.turns
         if pose == _CLOSES and _OPENS in turns and pose not in turns:
-            # The shape is the difference between an open jaw with closed lips and jawOpen.
+            # The shape mouthClose is the difference between an open jaw with closed lips and
+            # jawOpen alone.
             opening = ways[_OPENS].astype(np.float64)
             return self._turned(opening + way, _OPENS) - self._turned(opening, _OPENS)
-        # A smile does not change how far the skin follows the jaw, but a corrective may.
+        # How far the skin follows the jaw is computed without the displacements of controls that do
+        # not move the jaw, such as a smile, but with the addition of the corrective.
         beside = [(c,) for c in pose if len(pose) > 1 and (c,) not in turns and (c,) in ways]
         if pose not in turns or not beside:
             return self._turned(way, pose)

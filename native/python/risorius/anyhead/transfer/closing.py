@@ -3,7 +3,8 @@
 
 The deformation gradient of a lid does not contain the height of the eye opening. If two points of
 the template's lids meet in a blink, the same points must meet on the head. So motions near these
-points are multiplied by the factor that closes the gap along the motion. A shift closes the rest.
+points are multiplied by the factor that closes the gap along the motion. A displacement is added to
+close the gap that remains.
 """
 
 from __future__ import annotations
@@ -17,9 +18,11 @@ from .template import TemplateFace
 BLINKS = ("eyeBlinkL", "eyeBlinkR")
 _MOVES = 0.02  # cm: a vertex that a blink moves less does not belong to a lid
 _MEETS, _APART = 0.1, 0.35  # cm: largest distance in contact, and least distance in the rest pose
-# cm: standard deviation of the fall-off around contacts, of the factor and of the shift
+# cm: standard deviation of the Gaussian by which the factor (_AROUND) and the shift (_BESIDE) fade
+# out with the distance from contacts of the lids.
 _AROUND, _BESIDE = 0.3, 0.15
-# of the largest sum of weights: with a smaller sum, the factor tends to 1 and the shift to 0
+# Fraction of the largest sum of the contacts' weights at a vertex. At vertices with a smaller sum,
+# the factor tends to 1 and the shift to 0.
 _REST = 0.02
 _SHARES = (0.3, 2.0)  # smallest and largest factor
 _ROWS = 256  # number of vertices that are compared at once
@@ -122,7 +125,8 @@ def _around(
 
 
 def _squares(one: Doubles, other: Doubles) -> Doubles:
-    """float64[n, m]: squares of the distances between points."""
+    """float64[n, m]: the squared distance of each of n points `one` from each of m points
+    `other`."""
     middle = other.mean(axis=0)  # numbers near 0 lose less precision
     a, b = one - middle, other - middle
     square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T

@@ -58,8 +58,9 @@ def softened(forms: Doubles, least: float) -> Doubles:
 
 
 def _sums(before: Surface, after: Doubles) -> tuple[Doubles, Doubles]:
-    """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges at each vertex (a before, b
-    after) and over its normal, scaled to the length of the edges."""
+    """float64[V, 3, 3] each: for each vertex, the sum of b a^T and the sum of a a^T over its edges
+    and its normal. a is the vector on the surface `before`, b the same vector on the surface
+    `after`. Normals are scaled to the length of the edges."""
     count = len(before.points)
     edges = before.edges()
     a = before.points[edges[:, 1]] - before.points[edges[:, 0]]

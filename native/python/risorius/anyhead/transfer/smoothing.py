@@ -49,7 +49,8 @@ class Smoothing:
         """A solver of held x + length^2 L x = right, where L is the Laplacian.
 
         Args:
-            held: float64[V], above 0: weight of each vertex's own value, in units of its area.
+            held: float64[V], above 0: weight of each vertex's own value. To give all vertices the
+                same weight per area, pass the result of areas().
             length: smoothing radius in the surface's unit.
         """
         weight = length**2 * self._weight

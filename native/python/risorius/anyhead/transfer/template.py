@@ -117,7 +117,8 @@ def left_over(ways: Mapping[Pose, Doubles | Floats]) -> dict[Pose, Doubles]:
     single controls and of smaller correctives of the same controls.
 
     Args:
-        ways: [V, 3] by pose, whole displacements as in TemplateFace.
+        ways: [V, 3] by pose, the displacements with all controls of the pose at 1, as in the
+            attribute `ways` of TemplateFace.
     """
     out: dict[Pose, Doubles] = {}
     for pose in sorted((p for p in ways if len(p) > 1), key=len):

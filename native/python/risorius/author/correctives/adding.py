@@ -134,7 +134,7 @@ def _add_targets(
         if m != skin:
             points = np.asarray(mesh.positions, np.float64)
             # Only for a coarser skin, the nearest point must have a similar normal. The normals of
-            # lashes point to both sides, so normals are not compared there.
+            # lashes point to both sides, so normals are not compared for lashes.
             is_skin = len(points) > _SKIN * len(made[skin].positions)
             normals = vertex_normals(points, face_lists(mesh)) if is_skin else np.zeros((0, 3))
             corners, shares, distance = nearest.of(points, normals)
@@ -165,7 +165,7 @@ def _add_targets(
 
 
 class _Nearest:
-    """The nearest points of a skin at rest."""
+    """Finds the points of a skin, in its rest pose, that are nearest to other points."""
 
     def __init__(self, dna: Dna, skin: int) -> None:
         self._dna, self._skin = dna, skin

@@ -22,7 +22,8 @@ _NO_SOLIDS = ("lash", "shell", "cornea", "edge", "cartilage", "saliva", "hair_",
 
 
 class Poser:
-    """Poses the skin and the solids by raw controls."""
+    """Computes poses of a face's skin, and of the solids that it must not intersect, from raw
+    controls."""
 
     def __init__(self, dna: Dna, skin: int, solids: Sequence[int]) -> None:
         self.dna = dna
@@ -129,8 +130,8 @@ def skin_and_solids(
 
     Args:
         dna: the face.
-        solids: parts of the names of meshes that the skin must not intersect. Meshes whose names
-            also contain a word of _NO_SOLIDS, such as eyelashes, are no solids.
+        solids: parts of the names of meshes that the skin must not intersect. A mesh whose name
+            also contains "lash", "cornea" or a similar word (_NO_SOLIDS) is no solid.
         lod: index of the LOD.
 
     Raises:

@@ -2,8 +2,9 @@
 """Searches for faults of combined expressions, and makes correctives that repair them.
 
 A fault is a state that none of the expressions has alone: skin inside teeth, eyes or itself, faces
-with more than 2.5 times their area, or folded faces. A repair fades out, near the fault only, parts
-of the pose that contribute little there (native/author/correct.h).
+with more than 2.5 times their area, or folded faces. A repair changes only the skin near a fault:
+there it fades out the parts of the pose that contribute little to the pose near the fault
+(native/author/correct.h).
 """
 
 from __future__ import annotations
@@ -77,9 +78,10 @@ class Found:
     correctives: list[Corrective] = field(default_factory=list)
     looked_at: int = 0  # number of checked pairs
     faulty: int = 0  # number of pairs with faults
-    # kind of fault, one of KINDS -> sum over all checked pairs, without correctives
+    # kind of fault ("volume", "stretched" or "folded") -> sum of these faults over all checked
+    # pairs, without correctives
     before: dict[str, float] = field(default_factory=dict)
-    # kind of fault -> sum over all checked pairs, with the correctives of pairs
+    # kind of fault -> sum of these faults over all checked pairs, with the correctives of pairs
     after: dict[str, float] = field(default_factory=dict)
 
 
@@ -214,7 +216,8 @@ def severity(sums: FaultSums) -> float:
 def find_correctives(
     dna: Dna, options: CorrectiveOptions | None = None, progress: Progress | None = None
 ) -> Found:
-    """Find correctives for the worst pairs and triples of controls, and for options.together.
+    """Find correctives for the worst pairs and triples of controls, and for the combinations in
+    options.together.
 
     Args:
         dna: a face of shapes; it is not changed.
@@ -288,7 +291,8 @@ def _named(search: Search, names: Sequence[str]) -> Controls:
 
 
 def values_of(sums: Sequence[FaultSums]) -> Doubles:
-    """float64[n, 3]: the sums of faults, one column for each of KINDS."""
+    """float64[n, 3]: the sums of faults, one row for each of the n sums. The columns are the volume
+    of intersections in mm3, the number of stretched faces, and the number of folded faces."""
     return np.array([[getattr(s, kind) for kind in KINDS] for s in sums], np.float64)
 
 
@@ -306,7 +310,7 @@ def fairest_of(sums: dict[Controls, FaultSums], most: int) -> list[Controls]:
         most: largest number of combinations.
 
     Returns:
-        Combinations with a severity above _LEAST.
+        The chosen combinations; each has a severity above _LEAST (0.1).
     """
     bad = _worst_of(sums, len(sums))
     if len(bad) <= most or most == 0:

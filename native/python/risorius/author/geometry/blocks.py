@@ -31,7 +31,8 @@ def blocks_of(positions: Doubles) -> list[Ints]:
         return [np.arange(count)]
     low, extent = positions.min(axis=0), max(float(np.ptp(positions, axis=0).max()), 1e-30)
     cell = np.minimum((positions - low) / extent * _CELLS, _CELLS - 1).astype(np.int64)
-    # The bits of the three numbers alternate (a Z-order curve), so that neighbours stay together.
+    # In `key` the bits of a vertex's cell in x, y and z alternate (a Z-order curve). So vertices
+    # that are near each other have keys that are near each other.
     key = np.zeros(count, np.int64)
     for bit in range(_CELLS.bit_length() - 1):
         for axis in range(3):
@@ -133,7 +134,8 @@ class SparseWeights:
         return len(self.joints)
 
     def __getitem__(self, vertices: Ints) -> Doubles:
-        """float64[n, joints]: dense weights of some vertices."""
+        """float64[n, joints]: the weights of the given vertices on all joints, as a dense
+        matrix."""
         out = np.zeros((len(vertices), self.count))
         rows = np.arange(len(vertices))
         for k in range(self.joints.shape[1]):
@@ -141,5 +143,5 @@ class SparseWeights:
         return out
 
     def some(self, vertices: Ints) -> SparseWeights:
-        """The weights of some vertices."""
+        """The weights of the given vertices, still sparse."""
         return SparseWeights(self.joints[vertices], self.weights[vertices], self.count)

@@ -63,8 +63,8 @@ class Fewer(Generic[F]):
     """A face for the fit of joints, whose large meshes are simplified.
 
     Attributes:
-        work: the face as Work; its meshes have the same indices.
-        wanted: mesh -> its displacements.
+        work: the face, in which simplified meshes replace the large meshes at the same indices.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         meshes: the simplified meshes by index.
         made: the simplified meshes with weights on the new joints; empty before these are known.
     """
@@ -89,9 +89,10 @@ def fewer_vertices(
     Args:
         work: the face.
         shaped: indices of the meshes that are fitted.
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         most: wanted number of vertices of all these meshes.
-        attributes: attributes for the simplification by mesh; missing ones are added.
+        attributes: index of a mesh -> result of attributes_of(), which the simplification
+            preserves; meshes without an entry are added.
         levels: (level, mesh) -> int64[n, 3], the layout indices of each triangle of a coarser LOD.
         go_on: called before each mesh; raises an error to stop.
     """
@@ -185,7 +186,7 @@ def _take_own(wanted: Wanted, kept: Ints, corners: Ints, shares: Doubles) -> Non
     Args:
         wanted: the displacements of the whole mesh.
         kept: int64[n], index in the whole mesh of each vertex of the simplified mesh.
-        corners, shares: as in Simplified; changed.
+        corners, shares: the attributes of the same names of Simplified; changed.
     """
     of_kept = wanted.at(kept)
     owner = _owners(wanted.mesh, kept)

@@ -101,7 +101,7 @@ class Mover:
 
         Args:
             dna: the face with the blend shape channels.
-            mesh: one of its meshes.
+            mesh: a mesh of the face.
         """
         self._positions = np.asarray(mesh.positions, np.float64)
         self._vertex, self._joint, self._weight = skin_entries(mesh)
@@ -115,8 +115,8 @@ class Mover:
             if int(channel) in of_channel:
                 self._channels.setdefault(int(source), []).append(int(channel))
         self._of_channel = of_channel
-        self._shift = np.zeros_like(self._positions)  # blend shape displacements; 0 between calls
-        # Joint -> its row in a Motion, or -1; all -1 between calls.
+        self._shift = np.zeros_like(self._positions)  # by blend shapes; all 0 outside moved()
+        # Joint -> its row in the Motion that moved() applies, or -1; all are -1 outside moved().
         self._place = np.full(len(dna.joint_names), -1)
 
     def sums(self, amounts: Doubles) -> Doubles:

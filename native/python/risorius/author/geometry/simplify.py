@@ -18,8 +18,9 @@ _MOTION = 2.0  # weight of displacements by expressions relative to positions
 _COMPONENTS = 6  # number of principal components of the displacements
 _TRIES = 4
 _STUCK = 1.5  # factor of the vertex budget above which seams of the texture are welded
-# Pieces of a mesh (eyes, teeth, lashes) keep at least _LEAST_OF_PIECE vertices. Pieces smaller than
-# _SMALL_PIECE of the mesh are all removed if they would keep fewer than _GONE vertices on average.
+# A connected piece of a mesh, such as an eye, a tooth or a lash, keeps at least _LEAST_OF_PIECE
+# vertices. A piece is small if its longest side is below _SMALL_PIECE times the size of the mesh.
+# All small pieces are removed if they would keep fewer than _GONE vertices on average.
 _LEAST_OF_PIECE, _SMALL_PIECE, _GONE = 8, 0.06, 3.0
 _CARD, _MANY = 16, 60  # largest number of vertices of a hair card; smallest number of cards of hair
 # The fraction of kept hair cards is the fraction of kept vertices to this power. The power is below
@@ -130,7 +131,7 @@ def fewer_triangles(
 
     Args:
         mesh: the mesh; it is not changed.
-        attributes: float32[layouts, n], see attributes_of().
+        attributes: float32[layouts, n], the result of attributes_of(), which is preserved.
         vertices: wanted largest number of vertices; seams and borders may require more.
         begin: int64[n, 3], triangles of a finer level as layout indices, which are simplified
             further; None: all triangles of the mesh.
@@ -175,7 +176,7 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
     out = np.maximum(np.minimum(counts, _LEAST_OF_PIECE), np.round(share * counts))
     if share * counts[small].sum() < _GONE * small.sum():
         out[small] = 0
-    # Hair keeps whole cards, selected at equal steps.
+    # Of the cards of hair, every nth is kept whole, and the others are removed.
     among = min(len(cards), round(share**_THINNED * len(cards)))
     out[cards] = 0
     stay = cards[np.arange(among) * len(cards) // max(1, among)]

@@ -104,7 +104,8 @@ def psd_parts(dna: Dna) -> dict[int, frozenset[int]]:
 
 
 def joint_levels(dna: Dna) -> list[Ints]:
-    """Joint indices by depth in the hierarchy, roots first."""
+    """Joint indices by depth in the hierarchy, one array for each depth: first the roots, then
+    their children, and so on."""
     at = np.asarray(dna.joint_parents, np.int64)
     depth = (at != np.arange(len(at))).astype(np.int64)
     for _ in range(len(at).bit_length()):  # pointer jumping: 1 step up, then 2, then 4
@@ -124,7 +125,7 @@ def column_deltas(dna: Dna, columns: int) -> Doubles:
 
     Args:
         dna: the face.
-        columns: number of inputs, see column_count().
+        columns: number of inputs, the result of column_count().
     """
     out = np.zeros((columns, len(dna.joint_names) * 9))
     for group in dna.joint_groups:
@@ -253,7 +254,7 @@ def skinned(positions: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
     Args:
         positions: float64[V, 3], vertices before skinning.
         weights: float64[V, joints], skin weights.
-        motions: float64[joints, 3, 4], see column_motions().
+        motions: float64[joints, 3, 4], matrix of each joint from neutral to posed positions.
     """
     blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
     return np.einsum("vij,vj->vi", blended[..., :3], positions) + blended[..., 3]
@@ -277,7 +278,7 @@ class Influences:
 
         Args:
             positions: float64[V, 3], vertices before skinning.
-            motions: float64[joints, 3, 4], see column_motions().
+            motions: float64[joints, 3, 4], matrix of each joint from neutral to posed positions.
         """
         flat = motions.reshape(len(motions), 12)
         blended = sum(
@@ -304,7 +305,7 @@ class Skin:
         """float64[V, 3]: displacements of the vertices by linear blend skinning.
 
         Args:
-            motions: float64[joints, 3, 4], see column_motions().
+            motions: float64[joints, 3, 4], matrix of each joint from neutral to posed positions.
         """
         apart = motions - np.eye(3, 4)
         moving = np.flatnonzero(np.abs(apart).max(axis=(1, 2)) > STILL)
@@ -321,7 +322,7 @@ def before_skin(wanted: Doubles, weights: Doubles, motions: Doubles) -> Doubles:
     Args:
         wanted: float64[V, 3], positions after skinning.
         weights: float64[V, joints], skin weights.
-        motions: float64[joints, 3, 4], see column_motions().
+        motions: float64[joints, 3, 4], matrix of each joint from neutral to posed positions.
     """
     blended = (weights @ motions.reshape(len(motions), 12)).reshape(-1, 3, 4)
     right = (wanted - blended[..., 3])[..., None]

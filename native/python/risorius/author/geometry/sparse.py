@@ -96,7 +96,7 @@ def subset(shapes: Mapping[K, Doubles], keys: Iterable[K]) -> MutableMapping[K, 
 
     Args:
         shapes: SparseShapes or another mapping.
-        keys: keys of it.
+        keys: the keys whose shapes are returned.
     """
     if not isinstance(shapes, SparseShapes):
         return {key: shapes[key] for key in keys}

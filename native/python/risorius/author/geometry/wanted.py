@@ -57,7 +57,7 @@ class Wanted:
 
         Args:
             work: the face of shapes.
-            mesh: one of its meshes.
+            mesh: a mesh of the face.
             go_on: called before each block; raises an error to stop.
         """
         self.mesh, self._work = mesh, work
@@ -84,7 +84,7 @@ class Wanted:
 
     @property
     def small(self) -> bool:
-        """Whether the mesh is a single block."""
+        """Whether the mesh is a single block because it has at most LARGE (60,000) vertices."""
         return len(self._blocks) == 1
 
     def blocks(self) -> Iterator[Block]:
@@ -113,7 +113,8 @@ class Wanted:
         return out
 
     def evenly(self) -> Ints:
-        """Indices of at most LARGE vertices, evenly taken from all."""
+        """Indices of all vertices. If there are more than LARGE (60,000) vertices, only every
+        second, third or nth vertex is listed, so that at most LARGE indices are returned."""
         return np.arange(0, len(self), -(-len(self) // LARGE) if len(self) else 1)
 
 
@@ -135,7 +136,7 @@ def displacements(work: Face, mesh: Mesh) -> Doubles:
 
     Args:
         work: the face of shapes.
-        mesh: one of its meshes, or a block of one.
+        mesh: a mesh of the face, or a block of such a mesh.
     """
     positions = np.asarray(mesh.positions, np.float64)
     weights = sk.dense_weights(mesh, len(work.source.joint_names))
@@ -156,7 +157,7 @@ def joined_displacements(wanted: Mapping[int, Wanted], meshes: Sequence[int]) ->
     """float64[C, V, 3]: the displacements of all vertices of some meshes, concatenated.
 
     Args:
-        wanted: mesh -> its displacements.
+        wanted: index of a mesh -> displacements of the mesh in each expression.
         meshes: indices of the meshes.
     """
     every = [wanted[m].at(np.arange(len(wanted[m]))) for m in meshes]
@@ -164,12 +165,12 @@ def joined_displacements(wanted: Mapping[int, Wanted], meshes: Sequence[int]) ->
 
 
 def known_attributes(known: dict[int, Floats], m: int, wanted: Wanted) -> Floats:
-    """The attributes of a mesh for the simplification, computed at the first use.
+    """The result of attributes_of() for a mesh, which the simplification preserves.
 
     Args:
-        known: mesh -> attributes.
-        m: the mesh.
-        wanted: its displacements.
+        known: index of a mesh -> attributes that are already computed; the result is added.
+        m: index of the mesh.
+        wanted: the displacements of the mesh.
     """
     if m not in known:
         some = wanted.at(wanted.evenly())

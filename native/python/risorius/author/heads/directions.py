@@ -154,8 +154,8 @@ class _Look:
         return (axis, agreed, turned) if 3 * agreed > 2 * len(apart) else (None, 0, 0.0)
 
     def up(self, taken: Sequence[Doubles]) -> tuple[Doubles, bool]:
-        """The axis from the mouth to the brows, and whether the shapes determine it; otherwise the
-        axis is +y, or +z if y is taken.
+        """The axis from the mouth to the brows, and whether the shapes determine it. If they do not
+        determine it, the axis is +y, or +z if one of the axes `taken` is along y.
 
         Args:
             taken: axes to which the result must be perpendicular.

@@ -36,7 +36,9 @@ class FacePart:
         start, stop: range of its vertices.
         faces: range of its polygons.
         joint: name of the joint that the mesh follows.
-        material, source, polygons: its material and its origin, see HeadPart.
+        material: the material of the mesh, or None.
+        source: name of the object in the file to which the mesh belongs.
+        polygons: indices of the mesh's polygons in this object; None: all.
     """
 
     name: str
@@ -88,8 +90,9 @@ def join(
         where: name of the file in error messages.
         parts: the meshes in a common space.
         unit: unit of the format and of the result, "cm" or "m".
-        wishes: the user's settings; others are guessed.
-        edited: the user's meanings of names, see matching.assign().
+        wishes: the user's settings; a value that the user did not set is guessed.
+        edited: name of a shape -> meaning that the user gave it, in the notation that the module
+            `said` describes.
         axes: names of x, y and z in notes, each with a sign.
         stands: whether the meshes are already upright and in the unit, so that nothing is guessed.
 
@@ -382,8 +385,8 @@ class _Joining:
 
 
 def _add(whole: ObjMesh, uvs: list[Doubles], mesh: ObjMesh, start: int) -> None:
-    """Append a mesh. The corners of a mesh without texture coordinates all get the same
-    coordinate.
+    """Append a mesh to the joined mesh. All corners of a mesh without texture coordinates get the
+    texture coordinate (0, 0).
 
     Args:
         whole: the joined mesh; changed.

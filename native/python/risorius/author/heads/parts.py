@@ -86,7 +86,7 @@ class Wishes:
         left: direction of the character's left, one of AXES.
         up: direction of the top, one of AXES.
         front: direction in which the face looks, one of AXES.
-        unit: unit of the coordinates, see sizes.UNITS.
+        unit: unit of the coordinates, a key of sizes.UNITS such as "cm".
         scale: factor of the coordinates in addition to the unit.
         height_mm: height from the chin to the top of the head, mm.
     """

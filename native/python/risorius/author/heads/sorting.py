@@ -135,15 +135,16 @@ class Places:
 
 
 def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
-    """The joint that a mesh without shapes follows.
+    """Find the joint, head or jaw, that a mesh without shapes follows.
 
-    A mesh of all teeth is divided into upper and lower teeth.
+    A mesh with upper and lower teeth is divided into two meshes, because the upper teeth follow the
+    head and the lower teeth follow the jaw.
 
     Args:
         part: the mesh.
         places: places of the face.
 
-    Returns: (mesh or a part of it, name of its joint) pairs.
+    Returns: a list of pairs: the mesh or a part of it, and the name of the joint that it follows.
     """
     if places.jaw_open is None or not (_MOUTH.search(part.name) or places.in_mouth(part)):
         return [(part, HEAD)]

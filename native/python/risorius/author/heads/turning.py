@@ -178,14 +178,16 @@ def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
 def _divided(
     part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
 ) -> list[HeadPart]:
-    """Give each island of a mesh that lies inside an eye's sphere to that eye. Returns a list of
-    one mesh of the other islands; the list is empty if there are none.
+    """Give each island of a mesh that lies inside an eye's sphere to that eye. Returns a list with
+    one mesh, which has the islands that no eye gets; the list is empty if the eyes get all
+    islands.
 
     Args:
         part: the mesh.
         islands: int64[V], island of each vertex.
         eyes: both eyes.
-        own: for each eye, a vertex of its sphere if the sphere belongs to this part.
+        own: for each eye, the index of one vertex of its sphere; empty if the sphere belongs to
+            another part.
     """
     if _BESIDE.search(part.name):
         return [part]

@@ -209,7 +209,7 @@ def _polygons(scene: Scene, node: Node, count: int) -> tuple[list[list[int]], In
     Args:
         scene: the open file.
         node: the mesh.
-        count: number of its vertices.
+        count: number of vertices of the mesh.
     """
     order = _numbers(scene, node, "PolygonVertexIndex").astype(np.int64)
     last = order < 0
@@ -227,7 +227,7 @@ def _uvs(scene: Scene, node: Node, count: int, corners: Ints) -> tuple[Doubles, 
     Args:
         scene: the open file.
         node: the mesh.
-        count: number of its corners.
+        count: number of polygon corners of the mesh.
         corners: int64[count], vertex of each corner.
     """
     layer = node.first("LayerElementUV")
@@ -389,7 +389,7 @@ def _back(shift: Doubles) -> Doubles:
 
 
 class _Transforms:
-    """Matrices from the properties of a node."""
+    """Makes transformation matrices from the properties of an FBX node."""
 
     def __init__(self, scene: Scene, node: Node) -> None:
         self._scene, self._node = scene, node
@@ -421,7 +421,13 @@ class _Transforms:
         return np.diag([*self._three(name, 1.0), 1.0])
 
     def turn(self, name: str, order: str = "XYZ") -> Doubles:
-        """The matrix of a rotation about fixed axes, from angles in degrees."""
+        """float64[4, 4]: the matrix of a rotation.
+
+        Args:
+            name: name of the property with the three angles in degrees.
+            order: the axes in the order in which the node is rotated about them. The axes stay
+                fixed: they do not rotate with the node.
+        """
         angles = np.radians(self._three(name, 0.0))
         out = np.eye(4)
         for letter in order:

@@ -76,7 +76,7 @@ def _of_faces(mesh: Node, faces: int, materials: int) -> Ints:
 
     Args:
         mesh: the mesh.
-        faces: number of its polygons.
+        faces: number of polygons of the mesh.
         materials: number of materials of its node.
     """
     layer = mesh.first("LayerElementMaterial")
@@ -108,8 +108,9 @@ def _material(scene: Scene, path: Path, number: int) -> Material:
 def _add_picture(scene: Scene, path: Path, texture: int, role: str, out: Material) -> None:
     """Add the picture of a role to a material, or a note if the picture is not found.
 
-    The picture is embedded in the FBX, or in the folder of the FBX, in its .fbm folder or in the
-    folder textures beside it.
+    The picture is embedded in the FBX, or it is a file in one of three folders: the folder of the
+    FBX, the folder next to the FBX with the FBX's name and the ending .fbm, and the folder
+    "textures" next to the FBX.
 
     Args:
         scene: the open file.

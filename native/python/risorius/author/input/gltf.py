@@ -229,7 +229,7 @@ def _held(
 
 
 class _Part:
-    """The vertices of a primitive; other primitives may share them."""
+    """The vertices of a glTF primitive. Several primitives of a mesh may share these vertices."""
 
     def __init__(self, document: Document, primitive: Mapping[str, Any], place: str) -> None:
         attributes = primitive.get("attributes")
@@ -337,7 +337,7 @@ def _uvs(
         primitive: the primitive, with the number of its material.
         packed: reads the attributes.
         given: the attributes of the primitive: name -> accessor.
-        count: number of its vertices.
+        count: number of vertices of the primitive.
     """
     texture = _texture(document, primitive)
     extensions = texture.get("extensions")
@@ -378,7 +378,8 @@ def _texture(document: Document, primitive: Mapping[str, Any]) -> Mapping[str, A
 
 
 def _names(row: Mapping[str, Any], count: int) -> list[str]:
-    """Unique names of the morph targets, from extras.targetNames or numbered."""
+    """Unique names of the morph targets: the names in extras.targetNames; "target0" and so on if
+    the mesh has no such list or a list of another length."""
     extras = row.get("extras")
     given = extras.get("targetNames") if isinstance(extras, dict) else None
     rows = given if isinstance(given, list) and len(given) == count else [None] * count

@@ -31,7 +31,8 @@ class Assignment:
             a shape has its own control, which only the expression moves.
         known: vocabulary -> number of names that it knows; "" for words and the user's meanings.
         notes: sentences on unusual names.
-        by: shape -> the source of its meaning: a vocabulary, WORDS, PERSON (the user), or "".
+        by: shape -> the source of its meaning: the name of a vocabulary, WORDS (a plain word in the
+            name, such as "open"), PERSON (the user), or "" if the meaning is unknown.
     """
 
     controls: dict[str, list[str]]
@@ -56,7 +57,8 @@ class _Guess:
 
     @property
     def by(self) -> str:
-        """The source of the meaning: a vocabulary, WORDS, PERSON (the user), or ""."""
+        """The source of the meaning: the name of a vocabulary, WORDS (a plain word in the name,
+        such as "open"), PERSON (the user), or "" if the meaning is unknown."""
         return {0: PERSON, 3: WORDS}.get(self.rank, self.vocabulary)
 
     @property
@@ -131,11 +133,11 @@ def assign(names: Iterable[str], edited: Mapping[str, sayings.Said]) -> Assignme
     """Assign raw controls to shapes. Each control belongs to one shape only.
 
     The user's meanings come first, then names of a vocabulary, then words (mouthOpen for jawOpen).
-    Within these, shapes with a single control come before sums.
+    Within each of these three groups, shapes with a single control come before sums of controls.
 
     Args:
         names: names of the shapes.
-        edited: shape -> the user's meaning, in the form of the module said.
+        edited: shape -> the user's meaning, in the notation that the module `said` describes.
 
     Raises:
         GivenError: a meaning of the user is invalid.

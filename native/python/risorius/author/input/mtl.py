@@ -58,7 +58,14 @@ def _lines(path: Path) -> list[str]:
 
 
 def _read(path: Path, file: str, out: dict[str, Material]) -> None:
-    """Read an MTL file into a table of materials. An unreadable file gives a note at the key ""."""
+    """Read an MTL file.
+
+    Args:
+        path: path of the OBJ file.
+        file: name of the MTL file in the OBJ file.
+        out: receives the materials by name. If the MTL file cannot be read, it receives a material
+            with the name "" that has only a note for the user.
+    """
     material = Material(file)
     try:
         if not _is_near(file):

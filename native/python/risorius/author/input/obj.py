@@ -131,7 +131,12 @@ def refuse_other_kinds(path: Path, expected: str, own: Container[str] = ()) -> N
 
 
 def _lines(path: Path) -> Iterator[str]:
-    """Yields a file's lines. Raises ReadingError if it is too large or no file, and OSError."""
+    """Yields the lines of a file.
+
+    Raises:
+        ReadingError: the file is too large, or is a pipe or a device.
+        OSError: the file cannot be read.
+    """
     data = read_file(path, MESH, found=True)
     yield from io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
 

@@ -35,7 +35,7 @@ class ShapeSet:
 
     name: str
     mesh: ObjMesh
-    # name -> displacement [V, 3]
+    # name of an expression -> float64[V, 3], displacements of the vertices of `mesh`
     expressions: MutableMapping[str, Doubles] = field(default_factory=dict)
     left: int = 1  # the character's left is +x (1) or -x (-1)
     unit: str = "cm"

@@ -98,7 +98,8 @@ class Read:
         became: the controls of each shape; empty if the source is a DNA file.
         odd: sentences on unusual, guessed or left-out parts.
         materials: name of a mesh -> its material.
-        kept: parts of the names of meshes that keep their joints, see RigOptions.
+        kept: parts of the names of meshes that keep their skin weights and blend shapes, such as
+            eyeballs, which turn with their own joint.
         template: face whose animated maps the finished rig gets; None: the rig keeps its maps.
     """
 

@@ -293,8 +293,9 @@ def opposites() -> tuple[tuple[str, str], ...]:
 
 
 def as_found(found: Found) -> list[str]:
-    """Lines of text: the volume in which surfaces penetrate each other, and the numbers of torn and
-    folded faces, over all pairs of expressions, first without and then with the correctives.
+    """Lines of text: the volume in which surfaces penetrate each other, and the numbers of faces
+    that are stretched ("torn") or folded, summed over all pairs of expressions; each number first
+    without and then with the correctives.
     """
     a, b = found.before, found.after
     return [

@@ -111,7 +111,8 @@ def run(args: argparse.Namespace) -> int:
 def _counts(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace
 ) -> dict[int, int]:
-    """Mesh index -> vertex count, for the mesh that --mesh names, else for all of `surface`.
+    """Mesh index -> vertex count, for the mesh that --mesh names; without --mesh, for all meshes of
+    `surface`.
 
     Raises:
         CommandLineError: the face lacks this mesh.

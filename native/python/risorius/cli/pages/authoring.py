@@ -26,7 +26,7 @@ _DPI = 150
 
 
 def need_plot() -> None:
-    """Check that Matplotlib is installed. Raises: InputError."""
+    """Check that Matplotlib is installed. Raises: InputError: it is not installed."""
     try:
         from ...plot import report  # noqa: F401
     except ImportError as error:

@@ -18,8 +18,8 @@ from .targets import compare_targets
 
 Numbers = npt.NDArray[np.uint32]
 
-# For each array: its name, the noun for an element, the verb for its change, and the kind of its
-# amount.
+# Arrays of a mesh that are compared: the name of the array, the noun for one of its elements, the
+# verb for a changed element, and "length" or "number", which decides the unit of a change.
 _POINTS = (
     ("positions", "vertex", "moved", "length"),
     ("texture_coordinates", "UV", "changed", "number"),

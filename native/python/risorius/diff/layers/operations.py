@@ -65,7 +65,7 @@ def _size(sets: list[tuple[risorius.MlOperation, ...]], i: int) -> int:
 
 
 def _numbered(noun: str, count_a: int, count_b: int) -> Space:
-    """Elements that have no name and are identified by their index."""
+    """The elements of A and B of a kind without names; elements with the same index match."""
     pairs = pair(np.arange(count_a), np.arange(count_b))
     return Space(noun, [""] * count_a, [""] * count_b, pair_in_place(pairs, count_a, count_b))
 
@@ -103,7 +103,7 @@ def _list(place: Place, noun: str, a: npt.ArrayLike, b: npt.ArrayLike) -> None:
 
 
 def _stride(joints: risorius.MlJoints) -> int:
-    """Attributes per joint: 10 with quaternions, otherwise 9."""
+    """The number of attributes of each joint: 10 if rotations are quaternions, otherwise 9."""
     keys, values = joints.parameter_keys.tolist(), joints.parameter_values.tolist()
     return 10 if (1, 1) in zip(keys, values, strict=False) else 9
 

@@ -56,7 +56,8 @@ def _solver(place: Place, a: risorius.RbfSolver, b: risorius.RbfSolver) -> None:
 
 
 def _targets(place: Place, a: risorius.RbfSolver, b: risorius.RbfSolver) -> None:
-    """Report changed target values, matched by pose and control."""
+    """Report changed target values of an RBF solver; values of the same pose and control are
+    compared."""
     faces = place.faces
     shapes = [(len(s.pose_indices), len(s.raw_control_indices)) for s in (a, b)]
     if any(

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Differences of a mesh's blend shape targets, matched by channel, deltas by vertex."""
+"""Differences of a mesh's blend shape targets. Targets are matched by channel, and their deltas
+are matched by vertex."""
 
 from __future__ import annotations
 

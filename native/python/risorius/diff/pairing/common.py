@@ -29,7 +29,8 @@ class Place:
 
         Args:
             name: name of the field, appended after a dot; "" for the same field.
-            what: prefix of each text there, after the prefix of this place.
+            what: prefix of each text that is reported at the new place; it follows the prefix of
+                this place.
         """
         field = ".".join(part for part in (self.field, name) if part)
         return Place(self.faces, self.layer, field, ", ".join(w for w in (self.what, what) if w))

@@ -149,7 +149,7 @@ class Comparison:
 
     @cached_property
     def psds(self) -> Space:
-        """Correctives, matched by their factors."""
+        """The correctives of both rigs, matched by their factors."""
         names_a, names_b = (
             correctives(dna, which, self.raw, self.ml, self.pose_controls)
             for dna, which in ((self.a, "a"), (self.b, "b"))
@@ -162,7 +162,7 @@ class Comparison:
 
     @cached_property
     def networks(self) -> Space:
-        """Networks, matched by the controls that they write."""
+        """The networks of both rigs, matched by the controls that they write."""
         a = self.a.machine_learned_behavior.neural_networks
         b = self.b.machine_learned_behavior.neural_networks
         pairs = pair_sets(
@@ -172,7 +172,8 @@ class Comparison:
         return Space("network", [""] * len(a), [""] * len(b), pairs)
 
     def rows_in_a(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
-        """Common numbers of attributes of A's joints: the joint's number * stride + attribute.
+        """Common numbers of attributes of A's joints: common number of the joint * stride +
+        attribute.
 
         Args:
             outputs: int[n], joint index * stride + attribute, as stored in the joint groups of A.
@@ -182,7 +183,8 @@ class Comparison:
         return self.joints.in_a(joint) * stride + attribute
 
     def rows_in_b(self, outputs: npt.ArrayLike, stride: int = 9) -> Ints:
-        """Common numbers of attributes of B's joints: the joint's number * stride + attribute.
+        """Common numbers of attributes of B's joints: common number of the joint * stride +
+        attribute.
 
         Args:
             outputs: int[n], joint index * stride + attribute, as stored in the joint groups of B.

@@ -35,13 +35,13 @@ class Space:
         self.b[pairs.b] = pairs.a
 
     def in_a(self, indices: npt.ArrayLike) -> Ints:
-        """The common numbers of elements of A by index; an index beyond the end gets a number of
-        its own, equal in both lists."""
+        """The common numbers of elements of A, by their indices in A. An index beyond the end of A
+        gets a number that no element has; in_b() gives the same number for this index."""
         return _look_up(self.a, integers(indices))
 
     def in_b(self, indices: npt.ArrayLike) -> Ints:
-        """The common numbers of elements of B by index; an index beyond the end gets a number of
-        its own, equal in both lists."""
+        """The common numbers of elements of B, by their indices in B. An index beyond the end of B
+        gets a number that no element has; in_a() gives the same number for this index."""
         return _look_up(self.b, integers(indices))
 
     def label(self, number: int) -> str:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The bones of a humanoid: their names in programs and files, and positions of added ones."""
+"""The bones of a humanoid: their names in programs and files, and the positions of bones that are
+added to a face."""
 
 from __future__ import annotations
 
@@ -153,8 +154,8 @@ def wanted(own: Iterable[str], kind: str) -> list[str]:
 
     Args:
         own: bones that the face has.
-        kind: one of KINDS: minimal adds the needed bones, mixamo all but the jaw; "": adds none,
-            except a chest below an upper chest.
+        kind: "minimal" adds the bones that VRM requires, "mixamo" adds all bones but the jaw, ""
+            adds no bones. Any kind adds a chest if the humanoid has an upper chest.
     """
     out = set(own)
     if kind == "mixamo":

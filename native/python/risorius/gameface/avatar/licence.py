@@ -55,7 +55,7 @@ def read(path: Path, version: str) -> dict[str, Any]:
 
     Args:
         path: path of the file.
-        version: one of VERSIONS.
+        version: VRM version, "1.0" or "0.x".
 
     Raises:
         GameFaceError: a field is missing, empty, unknown, or has a value that is not allowed.
@@ -70,7 +70,7 @@ def checked(table: Mapping[str, Any], version: str, where: str) -> dict[str, Any
 
     Args:
         table: field with its VRM 1.0 name -> value.
-        version: one of VERSIONS.
+        version: VRM version, "1.0" or "0.x".
         where: source of the fields, for errors.
 
     Raises:

@@ -43,8 +43,8 @@ class Manner:
     Attributes:
         look: preset lookLeft, lookRight, lookUp or lookDown -> rotation of the eyes in degrees;
             presets that do not turn the eyes are absent.
-        held: preset -> kinds of other presets, as keys of the table KINDS; a VRM viewer fades out
-            presets of these kinds while the preset is on.
+        held: preset -> kinds of other presets ("Blink", "LookAt" or "Mouth"); a VRM viewer fades
+            out presets of these kinds while the preset is on.
     """
 
     look: Mapping[str, float] = field(default_factory=dict)

@@ -142,12 +142,18 @@ class _Reader:
         return Collider(own, ends[0], radius * self._size(node), ends[1] if tail else None)
 
     def _moved(self, node: Any, offset: list[float], own: int) -> list[float]:
-        """An offset from a node of the file, converted to the axes of the exported node `own`."""
+        """An offset in metres, in the axes of the exported node `own`.
+
+        Args:
+            node: number of a node in the body's file.
+            offset: a point in the axes of this node.
+            own: index of the exported node from which the result is measured.
+        """
         at = (self._body.world[node] @ [*offset, 1.0])[:3] - self._body.places[own]
         return list(map(float, self._turns[own].T @ (at * self._flip)))
 
     def _size(self, node: Any) -> float:
-        """Metres per unit of a node's axes."""
+        """The length in metres of one unit in the axes of a node."""
         return float(np.cbrt(abs(np.linalg.det(self._body.world[node][:3, :3]))))
 
     def _node(self, node: object, place: str) -> int:

@@ -161,6 +161,7 @@ class _Writer:
         return self._glb.vertices(rows, bounds=name == "POSITION")
 
     def _turned(self, rows: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Rows of vectors in the axes of the exported file."""
+        """Vectors, one in each row, converted from the axes of the body to the axes of the exported
+        file."""
         flip = np.r_[self._flip, 1.0][: rows.shape[1]]
         return np.ascontiguousarray(rows * flip, "<f4")

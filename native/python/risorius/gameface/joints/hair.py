@@ -239,7 +239,7 @@ def _woven(
 
     Args:
         hair: the mesh.
-        cards: its hair cards.
+        cards: the hair cards of the mesh.
         member: bool[cards], whether a card belongs to the bundle.
         chain: indices of the bundle's joints, from the root to the tip.
         heights: float64[joints], heights of these joints in metres.

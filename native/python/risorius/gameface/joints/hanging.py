@@ -23,10 +23,10 @@ def hung(skeleton: Skeleton, body: Body) -> tuple[Skeleton, Doubles]:
     """Move the joints of a face onto a body; also returns float64[3], the face's motion in metres.
 
     The midpoint of the face's eyes is moved to the midpoint of the body's eye bones. If the face or
-    the body has no eye bones, the head joint is moved to the head bone. The motion in depth is also
-    the head joint's if the depths of the eyes in both heads differ by more than 3 cm. The face's
-    root is replaced by the node above the body's neck. Other bones below the root, except neck and
-    head, become children of the head.
+    the body has no eye bones, the head joint is moved to the head bone. Only the depth (z) of the
+    motion is also taken from the head joint and the head bone if it differs by more than 3 cm from
+    the depth by the eyes. The face's root is replaced by the node above the body's neck. Other
+    bones below the root, except neck and head, become children of the head.
 
     Args:
         skeleton: joints of the face alone.

@@ -66,7 +66,8 @@ def find_skeleton(
     Args:
         dna: the face with its joints.
         axes: from parts.axes_of; maps the file's axes and unit to glTF's.
-        kind: one of humanoid.KINDS, which adds missing bones; "": only joints of the face.
+        kind: "minimal" or "mixamo", a kind of humanoid whose missing bones are added; "": only
+            joints of the face.
         is_body: whether to include the bones of the body that the face has.
         is_turned: whether bones have the axes of Mixamo's bones.
 

@@ -13,13 +13,13 @@ INFLUENCES = 4
 
 
 def strongest(dense: Doubles) -> tuple[Ints, Doubles]:
-    """int64[V, INFLUENCES], float64[V, INFLUENCES]: the strongest joints and their weights.
+    """int64[V, 4], float64[V, 4]: the four strongest joints of each vertex, and their weights.
 
-    Weights are multiples of 1 / 255 and add up to 1.
+    Weights are multiples of 1 / 255, and the weights of a vertex add up to 1.
 
     Args:
-        dense: float64[V, joints], all weights, for at least INFLUENCES joints; each vertex has a
-            weight above 0.
+        dense: float64[V, joints], all weights, for at least four joints; each vertex has a weight
+            above 0.
     """
     joints = np.argsort(-dense, axis=1, kind="stable")[:, :INFLUENCES]
     weights = np.take_along_axis(dense, joints, axis=1)

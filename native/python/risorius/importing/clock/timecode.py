@@ -34,8 +34,8 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
     Args:
         text: the cell; ; or , before the frame means drop-frame.
         name: the file's name in errors.
-        line: from 1, for errors.
-        column: from 1, or its header, for errors.
+        line: number of the line from 1; for errors.
+        column: number of the column from 1, or the header of the column; for errors.
 
     Raises:
         AnimationFileError: not of this form; more than 23 hours, 59 minutes or 59 seconds.

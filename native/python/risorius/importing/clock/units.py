@@ -47,7 +47,8 @@ _NAMES: dict[str, str] = {
     **{f"{word}in{unit}": of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{unit: _UNIT_OF[unit] for unit in _ALONE},
     **dict.fromkeys(_FRAME_NUMBERS, FRAMES),
-    # These entries are last, because they replace equal keys: "times" is not "time" with unit "s".
+    # These entries are last, so that they replace equal keys above: the header "times" is a word
+    # without a unit, and not the word "time" with the unit "s".
     **dict.fromkeys([*_WORDS, "t", "ts"], ""),
 }
 # Texts in brackets in the header of frame numbers, as in "frame (no)", that are no unit of time.
@@ -147,7 +148,8 @@ def seconds_of(
     Args:
         values: float64[frames], as in the file.
         said: unit in the header.
-        asked: the caller's options; the caller of this function handles `counts_rows`.
+        asked: the options on time from the user. The option `counts_rows` has no effect here; code
+            that calls this function must check it before.
         notes: receives a sentence if a unit other than seconds is inferred, and if dates are
             counted from the first frame.
         name: the file's name in errors.
@@ -196,7 +198,7 @@ def _shown(values: Doubles, name: str, column: str | None) -> str:
         column: column of the times, for errors.
 
     Raises:
-        AnimationFileError: none fits.
+        AnimationFileError: the size and the steps of the times fit no unit.
     """
     smallest = float(values.min(initial=np.inf))
     for unit, least in _DATES:

@@ -144,7 +144,8 @@ def human_bytes(size: int) -> str:
 
 
 def descriptor(facts: Facts) -> str:
-    """A line of text about the character and its file."""
+    """A line of text: version of the DNA format, gender and age of the character, number of LODs,
+    units, axes and file size."""
     dna = facts.dna
     parts = [
         f"DNA {dna.generation}.{dna.version}",

@@ -33,8 +33,8 @@ _SECTIONS_OF_2_1 = (
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer of the file, or other bytes of it. `key` is the layer's four-letter code in the
-    file's index, "" if it has none."""
+    """A layer of the file, or a range of bytes in no layer. `key` is the layer's four-letter code
+    in the file's index, or "" if the file has no index or the bytes are in no layer."""
 
     key: str
     title: str
@@ -44,7 +44,8 @@ class Layer:
 
 @dataclass(frozen=True)
 class Extras:
-    """Numbers that only the layers of newer files state: network controls, RBF poses, networks."""
+    """Numbers from layers that old files do not have: controls that networks write, controls that
+    RBF poses write, and networks."""
 
     ml_controls: int
     rbf_poses: int
@@ -157,7 +158,8 @@ def _machine_learning(body: bytes) -> tuple[int, int]:
 
 
 def _pose_controls(bodies: dict[str, bytes]) -> int:
-    """The number of controls that RBF poses write; without the layer rbfe, one per pose."""
+    """The number of controls that RBF poses write, from the layer rbfe; if this layer names no
+    controls, the number of poses in the layer rbfb."""
     try:
         reader = _Bytes(bodies.get("rbfe", b""))
         if names := reader.u32():

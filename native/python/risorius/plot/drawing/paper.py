@@ -19,7 +19,8 @@ from matplotlib.figure import FigureBase
 
 from ..content.regions import COLORS
 
-# page.py replaces these exact values in the SVG text by variables of its theme.
+# Colours of the drawings. page.py replaces these values in the SVG text by colour variables of the
+# HTML page, so that the drawings follow its light or dark theme.
 INK = "#1d232b"
 MUTED = "#66707d"
 RULE = "#d4dae1"

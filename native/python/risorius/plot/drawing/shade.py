@@ -28,8 +28,8 @@ _BATCH = 1 << 20  # pixels per batch, which limits the memory to about 150 MB
 class Surface:
     """Triangles to render, with points and normals in view axes.
 
-    paint: float64[V], a lightness per vertex, 1 for plain clay, or float64[V, 3], a colour. The
-    colour of clay is multiplied by it.
+    paint: float64[V], a lightness per vertex, or float64[V, 3], a colour per vertex. The colour of
+    clay is multiplied by this value, so that 1 means plain clay.
     """
 
     points: Floats
@@ -44,7 +44,8 @@ def triangles_of(mesh: risorius.Mesh) -> Ints:
 
 
 def corners_of(mesh: risorius.Mesh) -> Ints:
-    """int64[F, 3]: the faces of a mesh as triangle fans, as indices of vertex layouts."""
+    """int64[F, 3]: the faces of a mesh as triangle fans, as indices of its vertex layouts (a
+    layout is a position with a texture coordinate and a normal)."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.face_layouts, np.int64)
     if len(offsets) < 2:

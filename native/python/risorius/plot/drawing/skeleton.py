@@ -15,7 +15,8 @@ from risorius.rigs.rotation import Convention
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-# File axis -> (right, up, front): x to the viewer's right, y up, z towards the viewer.
+# Direction of a file axis -> its unit vector (right, up, front) in view axes: x to the viewer's
+# right, y up, z towards the viewer.
 _DIRECTIONS = {
     "left": (-1, 0, 0),
     "right": (1, 0, 0),
@@ -45,7 +46,8 @@ def rotations(dna: risorius.Dna) -> Floats:
 
 
 def _rows(values: npt.NDArray[np.float32], count: int) -> Floats:
-    """float64[count, 3]: the values; 0 for missing rows and for values that are not finite."""
+    """float64[count, 3]: the values, three per row; 0 for missing rows and for values that are not
+    finite."""
     rows = np.zeros((count, 3))
     given = np.asarray(values, float).reshape(-1, 3)[:count]
     rows[: len(given)] = np.nan_to_num(given, posinf=0.0, neginf=0.0)
