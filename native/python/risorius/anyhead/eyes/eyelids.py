@@ -381,10 +381,13 @@ class Eyelids:
         far[column[best]] = ((1 - s) * away[a] + s * away[b])[best]
         return out, far
 
-    def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
+    def _lacks(
+        self, points: Doubles, turn: Doubles | None, above: float, bare: Mask | None = None
+    ) -> Doubles:
         """float64[n]: distance by which each lid vertex must move outwards, so that all of its
         triangles are at least the distance `above` from the eye's surface; 0 if they already are.
-        Only triangles that are outside the eye in the rest pose count."""
+        Only triangles that are outside the eye in the rest pose count, and in the columns `bare`
+        (see _apart) also triangles just below its surface."""
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
         tree = self._posed(points)
         rays = self._looks
@@ -403,7 +406,7 @@ class Eyelids:
             np.maximum.at(lacks, corners[hit, k], lack)
         return lacks
 
-    def _lifted(self, points: Doubles, turn: Doubles | None) -> Doubles:
+    def _lifted(self, points: Doubles, turn: Doubles | None, bare: Mask | None = None) -> Doubles:
         """float64[n, 3]: the points of the lids, lifted out of the eye. Points that are too near to
         the eye's surface, or below it, are moved away from the eye's centre.
 
