@@ -55,7 +55,15 @@ def test_a_head_without_expressions_becomes_a_face(head, onto, dna_file, tmp_pat
     assert transfer == (0.5, False)
     (rig,) = rigs()
     wanted = to_blender(0.5 * opened(onto.heads[0].parts[0].mesh.positions))
-    np.testing.assert_allclose(moved_by(rig, "jawOpen"), wanted, atol=2e-4)
+    moved = moved_by(rig, "jawOpen")
+    np.testing.assert_allclose(moved, wanted, atol=2e-4)
+    scene.add_board()  # the template's face board and animated maps
+    controls, mesh = scene.controls(rig), scene.meshes(rig)[0]
+    rest = scene.evaluated(mesh)
+    controls.pose.bones["CTRL_C_jaw"].location.y = 1.0
+    scene.update(controls)
+    np.testing.assert_allclose(scene.evaluated(mesh) - rest, moved, atol=1e-5)
+    assert list(rig["maps"]) == [1.0, 0.0]
     assert [m.name for m in scene.meshes(rig)[0].data.materials] == ["Skin"]
     assert rig.matrix_world.translation.x > 2.1  # the rig is placed beside the head
     assert rig.matrix_world.translation.z == pytest.approx(0.5, abs=1e-4)

@@ -105,9 +105,10 @@ class Onto(Package):
         marks = SimpleNamespace(points={**self.places, **head.fixed}, notes=[])
         made = SimpleNamespace(shapes=shapes, landmarks=marks, notes=["It stands."])
         face = faces.make_shape_face(shapes, {"jawOpen": ["jawOpen"]})
-        return made, SimpleNamespace(
-            dna=face, kept=(), odd=["It stands.", "It is odd."], materials={}
-        )
+        dna = template.load()
+        part("anyhead.tables").copy_board(dna, face)
+        odd = ["It stands.", "It is odd."]
+        return made, SimpleNamespace(dna=face, kept=(), odd=odd, materials={}, template=dna)
 
     def _conform(self, head, dna, _progress):
         self.asked.append((dna, head))

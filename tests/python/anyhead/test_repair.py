@@ -195,6 +195,36 @@ def test_lips_that_are_far_apart_are_not_torn(head, skin):
     assert bare.notes == out.report.notes
 
 
+@pytest.mark.parametrize("together", [TOGETHER, ("mouthClose",)])
+def test_lips_that_are_apart_at_rest_meet_with_and_without_an_open_jaw(head, together):
+    jaw, closed = head.ways["jawOpen"], ("jawOpen", *together)
+    points = head.points + 0.4 * jaw
+    skin, bare = Surface.of_polygons(points, head.faces), part("face", points, head.faces)
+    each = 1 / len(together)  # share of the gap of an open jaw that one control closes
+    ways = {("jawOpen", name): jaw + each * (head.closed - jaw) for name in together}
+    out = repair(skin, head.faces, sort_parts([bare]), Corners(), None, head.ways,
+                 {**ways, closed: head.closed})  # fmt: skip
+    for pose in (together, closed):
+        after = out.report.rows["+".join(pose)][1]
+        assert after.lip_gap <= 0.3
+        assert after.lip_cut <= 0.3
+    assert out.report.notes == []
+    lips = Lips(skin, head.ways, np.stack([*Corners.points.values()]))
+    motion = sum(out.expressions[name] for name in together)
+    half = lips.meeting(points + 0.5 * motion).gap.mean()
+    assert half == pytest.approx(lips.rest.gap.mean() / 2, rel=0.25)
+
+
+def test_a_control_that_closes_too_far_at_rest_closes_only_an_open_jaw_further(head):
+    points = head.points + 0.4 * head.ways["jawOpen"]
+    skin, bare = Surface.of_polygons(points, head.faces), part("face", points, head.faces)
+    ways = head.ways | {"mouthClose": head.closed - head.ways["jawOpen"]}
+    out = repair(skin, head.faces, sort_parts([bare]), Corners(), None, ways, {})
+    assert np.array_equal(out.expressions["mouthClose"], ways["mouthClose"])
+    assert list(out.combinations) == [("jawOpen", "mouthClose")]
+    assert out.report.rows["jawOpen+mouthClose"][1].lip_gap <= 0.3
+
+
 def test_skin_that_is_pressed_into_teeth_comes_out(head, skin, fitted):
     flat = type(fitted)(fitted.face, copy.deepcopy(fitted.of("teeth")))
     for row in flat.rows:  # move the teeth towards the lips

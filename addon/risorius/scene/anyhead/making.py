@@ -117,6 +117,8 @@ def rig_task(
         tell = telling(task.part(JOINTS, _FITTED, 1.0), cancelled)
         few = native.part("anyhead.onto").FIT_VERTICES
         rig = shape_key_head.joint_rig(read.dna, wishes, read.kept, tell, few)
+        if read.template is not None:
+            native.part("anyhead.tables").copy_maps(read.template, rig.dna)
         if not cancelled():
             _write(rig.dna, read, wishes.path)
         found = finding.on_object(head, made.landmarks)

@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from .. import Conditionals, Dna
+from .. import Dna
 from ..author.correctives import add_correctives
 from ..author.geometry.skeleton import Doubles
 from ..author.geometry.sparse import SparseShapes, subset
@@ -40,6 +40,7 @@ from .laying import lay
 from .repair import repair
 from .standing import Standing, stand
 from .surface import Surface
+from .tables import copy_board
 from .transfer.template import Pose, Progress, read_template
 from .transfer.transfer import TransferOptions, transfer
 
@@ -202,7 +203,7 @@ def shape_face(made: Onto, template: Dna, where: str, progress: Progress | None 
 
     Args:
         made: the head with expressions; its shapes are changed.
-        template: the face whose GUI controls are copied.
+        template: the face whose GUI controls are copied, and the template of the result.
         where: name of the head in error messages.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
@@ -229,9 +230,9 @@ def shape_face(made: Onto, template: Dna, where: str, progress: Progress | None 
         own = [(which, delta[face.start : face.stop]) for which, delta in rows]
         adding = partial(add_correctives, dna, 0, own)
         dna = patiently(adding, lambda: _at(progress, _SHAPED))
-    _copy_board(template, dna)
+    copy_board(template, dna)
     _place_head(dna, made.joint)
-    return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept)
+    return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept, template)
 
 
 def whole_ways(ways: SparseShapes[Pose], progress: Progress | None = None) -> SparseShapes[Pose]:
@@ -257,25 +258,6 @@ def whole_ways(ways: SparseShapes[Pose], progress: Progress | None = None) -> Sp
 def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:
     count = len({name for part in parts for name in part.shapes})
     return [f"the head's own shapes are left out: {count:,}"] if count else []
-
-
-def _copy_board(template: Dna, dna: Dna) -> None:
-    """Copy from a template the GUI controls that drive raw controls of the face."""
-    names = {name.rpartition(".")[2]: i for i, name in enumerate(dna.raw_control_names)}
-    table = template.gui_to_raw
-    led = [template.raw_control_names[int(c)].rpartition(".")[2] for c in table.output_indices]
-    kept = np.flatnonzero([name in names for name in led])
-    used = sorted({int(table.input_indices[row]) for row in kept})
-    place = {gui: at for at, gui in enumerate(used)}
-    dna.gui_control_names = [template.gui_control_names[gui] for gui in used]
-    dna.gui_to_raw = Conditionals(
-        input_indices=[place[int(table.input_indices[row])] for row in kept],
-        output_indices=[names[led[row]] for row in kept],
-        from_values=np.asarray(table.from_values)[kept],
-        to_values=np.asarray(table.to_values)[kept],
-        slope_values=np.asarray(table.slope_values)[kept],
-        cut_values=np.asarray(table.cut_values)[kept],
-    )
 
 
 def _place_head(dna: Dna, place: Doubles) -> None:

@@ -19,6 +19,7 @@ from ..fittings.fitted import Bodies, Fittings, eye_turn_of
 from ..surface import Surface
 from .contact import LEAST, Contacts
 from .lips import COLUMNS, Lips
+from .parted import rest_closing
 from .report import MM, Faults, Report
 
 Pose = tuple[str, ...]
@@ -85,15 +86,16 @@ def repair(
     del registered
     closing = closing_pose(expressions, combinations)
     work = Repairing(target, faces, parts, landmarks, expressions, closing)
+    together = SparseShapes[Pose](len(target.points), combinations)
+    if closing and not any(set(pose) == set(closing) for pose in together):
+        together[closing] = _together(closing, expressions, combinations)
+    expressions, together = work.closed_at_rest(expressions, together)
     singles = SparseShapes[str](len(target.points))
-    jobs = len(expressions) + len(combinations) + 1
+    jobs = len(expressions) + len(together)
     for number, (name, way) in enumerate(expressions.items()):
         one = partial(work.repaired, (name,), np.asarray(way, np.float64))
         singles[name] = patiently(one, partial(_ask, progress, number / jobs))
         _ask(progress, number / jobs)
-    together = SparseShapes[Pose](len(target.points), combinations)
-    if closing and not any(set(pose) == set(closing) for pose in together):
-        together[closing] = _together(closing, expressions, combinations)
     out = SparseShapes[Pose](len(target.points))
     for number, (pose, way) in enumerate(together.items(), len(expressions)):
         changes = [singles[c] - expressions[c] for c in pose if c in singles]
@@ -216,6 +218,39 @@ class Repairing:
         if before != Faults() or after != Faults() or self._closes(pose):
             self.report.rows["+".join(pose)] = before, after
         return out
+
+    def closed_at_rest(
+        self, expressions: Mapping[str, Doubles], combinations: SparseShapes[Pose]
+    ) -> tuple[Mapping[str, Doubles], SparseShapes[Pose]]:
+        """Expressions and combinations in which the lip controls also close a mouth that is open in
+        the rest pose. If the lips meet in the rest pose, both are returned unchanged.
+
+        The report contains no faults from before this change.
+
+        Args:
+            expressions: float64[V, 3] by raw control, displacements of the skin.
+            combinations: float64[V, 3] by controls that are 1 together: their whole displacement,
+                with the controls that close the mouth of an open jaw.
+        """
+        if not self.lips.found or not self.lip_controls:
+            return expressions, combinations
+        added = rest_closing(self.lips, self.lip_controls, expressions, combinations)
+        if added is None:
+            return expressions, combinations
+        self.lip_controls = added.pose
+        singles = SparseShapes[str](len(self.target.points), expressions)
+        for name in self.lip_controls:
+            motion = added.motion((name,))
+            if motion.any():
+                singles[name] = motion + singles.get(name, np.zeros(1))
+        together = SparseShapes[Pose](len(self.target.points), combinations)
+        for pose in combinations:
+            motion = added.motion(pose)
+            if motion.any():
+                together[pose] = motion + together[pose]
+        if len(added.pose) > 1 and not any(set(pose) == set(added.pose) for pose in together):
+            together[added.pose] = _together(added.pose, singles, {}) + added.rest
+        return singles, together
 
     def faults(self, pose: Pose, way: Doubles) -> Faults:
         """Measure the faults of a pose.

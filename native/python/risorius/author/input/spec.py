@@ -100,6 +100,7 @@ class Read:
         materials: name of a mesh -> its material.
         kept: parts of the names of meshes that keep their skin weights and blend shapes, such as
             eyeballs, which turn with their own joint.
+        template: face whose animated maps the finished rig gets; None: the rig keeps its maps.
     """
 
     dna: Dna
@@ -107,6 +108,7 @@ class Read:
     odd: list[str]
     materials: dict[str, Material] = field(default_factory=dict)
     kept: tuple[str, ...] = ()
+    template: Dna | None = None
 
 
 def read_spec(path: Path) -> Spec:

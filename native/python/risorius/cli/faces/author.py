@@ -12,7 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ... import Dna
 from ...anim.reactions import load_exclusives
+from ...anyhead.tables import copy_maps
 from ...author.correctives import (
     CorrectiveOptions,
     Found,
@@ -122,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     _size(spec, args)
     options, asked = _options(spec, args), _correctives(spec, args)
     read, beside = _read(spec, args, say)
-    dna, became = read.dna, read.became
+    became = read.became
     is_table = args.names == "" or args.out is None
     for sentence in read.odd:  # comments, because the printed table can be saved and read as a file
         mark, into = "# " * is_table, sys.stderr if args.json else sys.stdout
@@ -142,18 +144,7 @@ def run(args: argparse.Namespace) -> int:
             raise CommandLineError("author: --report: another file than that of -o was expected")
         need_plot()
     options = replace(options, kept=(*options.kept, *read.kept))
-    source = dna
-    if asked.most or asked.together:
-        say.line("searching for faults of combined expressions")
-        found = find_correctives(dna, asked, say)
-        dna = add_correctives(dna, found.skin, [(x.controls, x.shape) for x in found.correctives])
-        say.line("\n".join(as_found(found)))
-    rig = make_joint_rig(dna, options, say)
-    if dna is not source and options.shapes and asked.once_more:
-        say.line("searching again for faults, in the face of joints and shapes")
-        rig.dna = correct_again(rig.dna, source, asked, say)
-    if options.lighter:
-        lighten(rig, source)  # limits deltas to those of the input; found correctives are not input
+    dna, rig = _rig(read, options, asked, say)
     rig.dna.metadata = dict(rig.dna.metadata) | metadata_of(
         rig.dna.mesh_names, read.materials, textures
     )
@@ -171,6 +162,27 @@ def run(args: argparse.Namespace) -> int:
     fileio.write_all(files)  # all files together, so that no face is written if the page fails
     print("\n".join(said))
     return 0
+
+
+def _rig(
+    read: Read, options: RigOptions, asked: CorrectiveOptions, say: _Clock
+) -> tuple[Dna, JointRig]:
+    """The face of blend shapes with the correctives that were found, and its finished joint rig."""
+    source = dna = read.dna
+    if asked.most or asked.together:
+        say.line("searching for faults of combined expressions")
+        found = find_correctives(dna, asked, say)
+        dna = add_correctives(dna, found.skin, [(x.controls, x.shape) for x in found.correctives])
+        say.line("\n".join(as_found(found)))
+    rig = make_joint_rig(dna, options, say)
+    if dna is not source and options.shapes and asked.once_more:
+        say.line("searching again for faults, in the face of joints and shapes")
+        rig.dna = correct_again(rig.dna, source, asked, say)
+    if options.lighter:
+        lighten(rig, source)  # limits deltas to those of the input; found correctives are not input
+    if read.template is not None:
+        copy_maps(read.template, rig.dna)
+    return dna, rig
 
 
 def _read(spec: Spec, args: argparse.Namespace, say: _Clock) -> tuple[Read, dict[Path, bytes]]:
