@@ -350,7 +350,9 @@ def from_marks(
     """
     found, more = board.paired(named)
     if not found or len(board.placed) != len(sounds):
-        raise SpokenError(told("no marker of this voice is left: show its markers again"))
+        raise SpokenError(
+            told("no marker of this voice is left: show its markers again with the button Markers")
+        )
     wanted: dict[int, float] = {}
     out = list(sounds)
     for place, mark in found.items():

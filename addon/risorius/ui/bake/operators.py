@@ -32,9 +32,13 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
             (
                 bake_face.RESULT,
                 "Bones, Shapes, Maps",
-                "The face itself: the actions play without the add-on",
+                "Actions for bones, shape keys and maps; they move the face without the add-on",
             ),
-            (bake_face.CONTROLS, "Controls", "Sliders and control bones, baked into one action"),
+            (
+                bake_face.CONTROLS,
+                "Controls",
+                "One action for the sliders and control bones; the add-on moves the face",
+            ),
         ),
     )
     wanted: bpy.props.EnumProperty(

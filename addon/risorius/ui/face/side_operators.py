@@ -53,7 +53,7 @@ class RISORIUS_OT_mirror(HandOperator, Operator):
 
 
 class RISORIUS_OT_copy_side(HandOperator, Operator):
-    """Make one side of the face like the other; the gaze stays"""
+    """Make one side of the face like the other; the direction of the gaze does not change"""
 
     bl_idname = "risorius.copy_side"
     bl_label = "Copy to Other Side"

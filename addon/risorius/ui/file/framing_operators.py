@@ -73,7 +73,7 @@ class RISORIUS_OT_hide_outlines(FaceOperator, Operator):
 
 
 class RISORIUS_OT_move_outlines(FaceOperator, Operator):
-    """Move the outlines of an older file from the eyes to the side of the face"""
+    """Move outlines that an older Risorius placed on the eyes to the side of the face"""
 
     bl_idname = "risorius.move_outlines"
     bl_label = "Move Outlines Beside Face"

@@ -36,7 +36,7 @@ class LayerOperator(FaceOperator):
 
 
 class RISORIUS_OT_layer_add(FaceOperator, Operator):
-    """Add a layer on top of the others: an action at its own frames, others at the current frame"""
+    """Add a layer on top: an action at its first frame, another source at the current frame"""
 
     bl_idname = "risorius.layer_add"
     bl_label = "Add Layer"

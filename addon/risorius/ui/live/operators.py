@@ -145,7 +145,7 @@ class _Waiting(OperatorBase):
 
 
 class RISORIUS_OT_live_finish(_Waiting, Operator):
-    """Put a waiting recording on the active face"""
+    """Make a waiting recording an action of the active face"""
 
     bl_idname = "risorius.live_finish"
     bl_label = "Finish"
