@@ -208,7 +208,7 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
 
 
 class RISORIUS_OT_bake_physics(FaceOperator, Operator):
-    """Bake all simulations of the scene with the faces of each frame"""
+    """Bake all simulations of the scene; they see each face at their own frame"""
 
     bl_idname = "risorius.bake_physics"
     bl_label = "Bake Physics"

@@ -292,7 +292,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
 
 
 class RISORIUS_OT_reset_board(_OnBoard, Operator):
-    """Bring handles of the face board to rest"""
+    """Bring all handles of the face board, or the selected ones, to rest"""
 
     bl_idname = "risorius.reset_board"
     bl_label = "Reset Board"

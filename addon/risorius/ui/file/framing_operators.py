@@ -55,7 +55,7 @@ def _only_outlines(context: Context) -> bool:
 
 
 class RISORIUS_OT_hide_outlines(FaceOperator, Operator):
-    """Hide the outlines of head, neck and eyes, or show them again; keys stay in the editors"""
+    """Hide or show the outlines of head, neck and eyes; the editors still show their keys"""
 
     bl_idname = "risorius.hide_outlines"
     bl_label = "Hide Outlines"

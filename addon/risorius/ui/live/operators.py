@@ -195,7 +195,9 @@ class RISORIUS_OT_live_neutral(_Running, Operator):
     bl_label = "Neutral Now"
 
     forget: bpy.props.BoolProperty(
-        name="Forget", description="Use received faces unchanged again", options={"SKIP_SAVE"}
+        name="Forget",
+        description="Forget the neutral face: received faces are used unchanged",
+        options={"SKIP_SAVE"},
     )
 
     def execute(self, context: Context) -> Result:

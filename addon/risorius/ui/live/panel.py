@@ -62,7 +62,7 @@ def _draw_waiting(layout: UILayout) -> None:
         box = layout.box()
         count = len(recording.take)
         text = words.say(
-            "{name}: a recording of {count} frames waits to be finished",
+            "{name}: recording of {count} frames, not finished",
             name=recording.face,
             count=count,
         )
