@@ -171,7 +171,7 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
     high = (sounds[after].begin if after < len(sounds) else end) - SHORTEST
     if low > high:
         raise SpokenError(
-            told("frame {frame:g}: this sound is too short to insert another", frame=begin)
+            told("frame {frame:g}: this sound is too short to insert another sound", frame=begin)
         )
     return [*sounds[:after], Sound(min(max(begin, low), high), name), *sounds[after:]]
 

@@ -328,7 +328,7 @@ def _at_selected(
 ) -> int:
     """Do the work of `by_hand` with at_selected: move and key at each frame with a selected key."""
     if tweaks.of(controls) is not None:
-        raise FaceError(told("A tweak is on: end it first, or work at the current frame."))
+        raise FaceError(told("A tweak is on: end the tweak first, or work at the current frame."))
     frames = selected_frames(controls)
     if not frames:
         raise FaceError(told("Select keys of this face first: there is no selected key."))

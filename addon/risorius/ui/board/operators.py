@@ -242,7 +242,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
     bl_label = "Lead"
 
     by: bpy.props.EnumProperty(
-        name="By", description="Sliders or face board: one of them moves the face", items=LEADERS
+        name="By", description="Whether the sliders or the face board move the face", items=LEADERS
     )
     use_keys: bpy.props.BoolProperty(
         name="Convert Keys",

@@ -111,7 +111,7 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
 
 
 class RISORIUS_OT_copy_pose(FaceOperator, Operator):
-    """Copy the visible pose, including layers, for this face or another"""
+    """Copy the visible pose, including layers, to paste it onto this or another face"""
 
     bl_idname = "risorius.copy_pose"
     bl_label = "Copy Face"

@@ -19,7 +19,7 @@ _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = session.keep(
 
 
 class RISORIUS_OT_frame_face(FaceOperator, Operator):
-    """Fit the whole head into the view, without its outlines and face board"""
+    """Fit the whole head into the view; outlines and face board may be outside the view"""
 
     bl_idname = "risorius.frame_face"
     bl_label = "Frame Face"

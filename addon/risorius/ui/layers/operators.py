@@ -108,7 +108,7 @@ class RISORIUS_OT_layer_remove(LayerOperator, Operator):
 
 
 class RISORIUS_OT_layer_move(LayerOperator, Operator):
-    """Move the active layer up or down; higher layers lie over lower ones"""
+    """Move the active layer up or down; a higher layer is applied after the lower layers"""
 
     bl_idname = "risorius.layer_move"
     bl_label = "Move Layer"

@@ -144,14 +144,12 @@ def idle(
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name}: a number above 0 was expected, found {value}")
     if loop and duration < 2.0:
-        raise ArgumentError(f"duration: at least 2 s were expected for a loop, found {duration}")
+        raise ArgumentError(f"duration: at least 2 s were expected of a loop, found {duration}")
     count = math.floor(duration * rate + 1e-6) + 1
     times = np.arange(count) / rate
     length = float(times[-1])
     if loop and length < 2.0:
-        raise ArgumentError(
-            f"rate: frames over at least 2 s were expected for a loop, found {rate}"
-        )
+        raise ArgumentError(f"rate: frames over at least 2 s were expected of a loop, found {rate}")
     saccades = make_saccades(seed, length, life, loop)
     blinks = make_blinks(seed, length, life, loop, saccades)
     curves = _gaze_curves(times, saccades, life)
