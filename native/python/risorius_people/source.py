@@ -76,7 +76,7 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
     if target.exists() and digest(target) == SHA256:
         return target
     if offline:
-        raise SourceError(f"{target} does not exist, and downloading was not allowed")
+        raise SourceError(f"{target} is not there, and downloading was not allowed")
     target.parent.mkdir(parents=True, exist_ok=True)
     fileio.check_writable(target)
     # On some systems pip's files stay locked for a moment; failing to delete them is no error.
