@@ -229,7 +229,7 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
     if label in was:
         change.report.append(
             told(
-                "The mesh {label} was deleted here and stays away, although the new DNA file has it.",
+                "The mesh {label} was deleted here and stays away, although the DNA file has it.",
                 label=label,
             )
         )
