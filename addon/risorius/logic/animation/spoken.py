@@ -171,7 +171,7 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
     high = (sounds[after].begin if after < len(sounds) else end) - SHORTEST
     if low > high:
         raise SpokenError(
-            told("frame {frame:g}: this sound is too short to insert another", frame=begin)
+            told("frame {frame:g}: this sound is too short to insert another sound", frame=begin)
         )
     return [*sounds[:after], Sound(min(max(begin, low), high), name), *sounds[after:]]
 
@@ -350,7 +350,9 @@ def from_marks(
     """
     found, more = board.paired(named)
     if not found or len(board.placed) != len(sounds):
-        raise SpokenError(told("no marker of this voice is left: show its markers again"))
+        raise SpokenError(
+            told("no marker of this voice is left: show its markers again with the button Markers")
+        )
     wanted: dict[int, float] = {}
     out = list(sounds)
     for place, mark in found.items():

@@ -162,7 +162,8 @@ def _axes(coordinate_system: Sequence[str]) -> Float:
     if abs(np.linalg.det(axes)) < 0.5:
         raise SpaceError(
             told(
-                "The file's axes {coordinate_system} lie in one plane.",
+                "The file's axes {coordinate_system} lie in one plane: three independent "
+                "directions were expected.",
                 coordinate_system=tuple(coordinate_system),
             )
         )

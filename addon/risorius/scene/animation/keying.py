@@ -342,7 +342,7 @@ def _at_selected(
         FaceError: no key is selected, or a tweak is active.
     """
     if tweaks.of(controls) is not None:
-        raise FaceError(told("A tweak is on: end it first, or work at the current frame."))
+        raise FaceError(told("A tweak is on: end the tweak first, or work at the current frame."))
     frames = selected_frames(controls)
     if not frames:
         raise FaceError(told("Select keys of this face first: there is no selected key."))

@@ -23,8 +23,8 @@ KINDS = (
 )
 BLENDS = (
     ("OVERRIDE", "Override", "Replace lower layers"),
-    ("ADD", "Add", "Add this layer to lower layers"),
-    ("MAXIMUM", "Maximum", "Use the higher value of this layer and lower layers"),
+    ("ADD", "Add", "Add the values of this layer to the values of the lower layers"),
+    ("MAXIMUM", "Maximum", "Use the higher value: of this layer, or of the lower layers"),
 )
 EXTENDS = (
     ("HOLD", "Hold", "Hold the first frame before the start, and the last frame after the end"),

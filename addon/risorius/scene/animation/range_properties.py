@@ -47,7 +47,7 @@ class RISORIUS_PG_range(bpy.types.PropertyGroup):
 
     used: bpy.props.BoolProperty(
         name="Use",
-        description="Stretch the captured values of this control; off: keep the values",
+        description="Apply the range to this control; off: keep the captured values",
         override=_OVERRIDE,
         update=_touch,
     )
@@ -167,7 +167,9 @@ def _all() -> dict[str, object]:
         SOURCE: bpy.props.StringProperty(options=set(), override=_OVERRIDE),
         SWITCH: bpy.props.BoolProperty(
             name="Use the Range",
-            description="Stretch captures of this face, imported and live, from neutral to extreme",
+            description=(
+                "Apply the range to imported and live captures: neutral becomes 0, the extreme 1"
+            ),
             translation_context=tables.CONTEXT,
             default=True,
             options=set(),

@@ -328,7 +328,7 @@ def read_all(where: Path) -> list[native.Expression]:
     if troubles:
         raise LibraryError(troubles[0])
     if not found:
-        raise LibraryError(told("The folder {folder} holds no expressions.", folder=where.name))
+        raise LibraryError(told("The folder {folder} contains no expressions.", folder=where.name))
     names = [expression.name for _, expression in found]
     for number, name in enumerate(names):
         if name in names[:number]:

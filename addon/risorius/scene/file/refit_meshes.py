@@ -254,7 +254,7 @@ def _back_up(
     if bound:
         change.report.append(
             told(
-                "{name} has new polygons: bind {bound} again.",
+                "{name} has new polygons: bind these modifiers again: {bound}.",
                 name=item.name,
                 bound=", ".join(bound),
             )
@@ -311,8 +311,8 @@ def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None
     change.report.append(
         told(
             (
-                "The mesh {label} is not in the DNA file; in the scene this mesh stays, hidden, "
-                "for {things}."
+                "The mesh {label} is not in the new DNA file; in the scene this mesh stays, "
+                "hidden, for {things}, which would be lost otherwise."
             ),
             label=label,
             things=", ".join(things),

@@ -227,7 +227,12 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
     label = next(m.label for m in change.new.meshes if m.index == item[parts.MESH])
     was = {names.unique_labels(change.before.dna.mesh_names)[m.index] for m in change.old.meshes}
     if label in was:
-        change.report.append(told("The mesh {label} was deleted here and stays away.", label=label))
+        change.report.append(
+            told(
+                "The mesh {label} was deleted here and stays away, although the DNA file has it.",
+                label=label,
+            )
+        )
         return
     for key in [k for k in fresh.keys() if fresh[k] == item]:  # noqa: SIM118  no dict
         del fresh[key]

@@ -31,7 +31,8 @@ def _all() -> dict[str, object]:
         "risorius_converge": bpy.props.FloatProperty(
             name="Eyes Meet",
             description=(
-                "Amount by which the eyes converge on the target; 0: the eyes stay parallel"
+                "Convergence of the eyes; 1: both eyes look at the target, "
+                "0: the eyes stay parallel"
             ),
             **shared,
         ),

@@ -243,7 +243,8 @@ def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
     if not (np.diff(begins) > 0.0).all() or not said.fps > 0.0 or not said.rate > 0.0:
         raise SpokenError(
             told(
-                "{action}: sounds that begin one after the other were expected", action=action.name
+                "{action}: a list of sounds in the order of their start was expected",
+                action=action.name,
             )
         )
     if action.library is not None:

@@ -28,7 +28,7 @@ def describe(rig: ArmatureObject) -> list[str]:
     lines = [
         words.say(
             (
-                "{controls} controls, {joints} joints, {moved} of them moved by the DNA file, "
+                "{controls} controls, {joints} joints ({moved} of them follow controls), "
                 "{channels} blend shape channels, {maps} animated maps."
             ),
             controls=len(live.labels),

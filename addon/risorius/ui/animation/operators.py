@@ -64,8 +64,8 @@ ANGLES = (
         "AUTO",
         "As the File Says",
         (
-            "Angles are read as radians; if a head cannot turn by such angles, the import "
-            "stops with a message"
+            "The import reads the angles as radians, and stops with a message if no head can "
+            "turn as far"
         ),
     ),
     ("RADIANS", "Radians", ""),

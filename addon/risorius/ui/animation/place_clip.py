@@ -27,7 +27,11 @@ TARGETS = (
 )
 RANGES = (
     ("EXTEND", "Extend", "Extend the scene to the end of the animation"),
-    ("FIT", "Fit", "Set the start and end of the scene to those of the animation"),
+    (
+        "FIT",
+        "Fit",
+        "Set the start and end of the scene to the first and last frame of the animation",
+    ),
     ("KEEP", "Keep", "Keep the range of the scene"),
 )
 _REPORT = "risorius_report"  # property of an action: the report of its import

@@ -33,9 +33,13 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
             (
                 bake_face.RESULT,
                 "Bones, Shapes, Maps",
-                "The face itself: the actions play without the add-on",
+                "Actions for bones, shape keys and maps; they move the face without the add-on",
             ),
-            (bake_face.CONTROLS, "Controls", "Sliders and control bones, baked into one action"),
+            (
+                bake_face.CONTROLS,
+                "Controls",
+                "One action for the sliders and control bones; the add-on moves the face",
+            ),
         ),
     )
     wanted: bpy.props.EnumProperty(
@@ -206,7 +210,7 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
 
 
 class RISORIUS_OT_bake_physics(FaceOperator, Operator):
-    """Bake all simulations of the scene with the faces of each frame"""
+    """Bake all simulations of the scene; they see each face at their own frame"""
 
     bl_idname = "risorius.bake_physics"
     bl_label = "Bake Physics"

@@ -248,7 +248,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
     bl_label = "Lead"
 
     by: bpy.props.EnumProperty(
-        name="By", description="Sliders or face board: one of them moves the face", items=LEADERS
+        name="By", description="Whether the sliders or the face board move the face", items=LEADERS
     )
     use_keys: bpy.props.BoolProperty(
         name="Convert Keys",
@@ -298,7 +298,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
 
 
 class RISORIUS_OT_reset_board(_OnBoard, Operator):
-    """Bring handles of the face board to rest"""
+    """Bring all handles of the face board, or the selected ones, to rest"""
 
     bl_idname = "risorius.reset_board"
     bl_label = "Reset Board"

@@ -48,7 +48,7 @@ def symmetric_property() -> object:
 def method_property() -> object:
     return bpy.props.EnumProperty(
         name="Method",
-        description="Method that finds the sliders",
+        description="Method that chooses the sliders that bring the dragged point to the pointer",
         items=METHODS,
         options={"SKIP_SAVE"},
     )

@@ -87,15 +87,17 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
         description="Meshes of the body to leave out, such as its head, separated by commas",
     )
     use_springs: bpy.props.BoolProperty(
-        name="Springs", description="Let the long hair of a VRM swing", default=True
+        name="Springs",
+        description="Let long hair swing in programs that play the VRM file",
+        default=True,
     )
     use_quantize: bpy.props.BoolProperty(
         name="Quantize",
-        description="Store vertices with 16 bits; most programs can read such a file",
+        description="Store coordinates of vertices in 16 bits; most programs can read such a file",
     )
     use_meshopt: bpy.props.BoolProperty(
         name="Compress",
-        description="Compress with meshoptimizer; not every program can read such a file",
+        description="Compress the file with meshoptimizer; some programs cannot read such a file",
     )
     use_combinations: bpy.props.BoolProperty(
         name="Combinations",

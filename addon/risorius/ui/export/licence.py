@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import bpy
 
-_UNSAID = ("UNSAID", "Not Said", "Not chosen yet; a VRM file must state this")
+_UNSAID = ("UNSAID", "Not Said", "Not chosen yet; a VRM file must state this field")
 _YES, _NO = "ALLOWED", "FORBIDDEN"
 
 

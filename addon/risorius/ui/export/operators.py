@@ -83,8 +83,16 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
             "objects"
         ),
         items=(
-            ("FBX_SCALE_NONE", "On Objects", "Objects have scale 100, as Unreal expects"),
-            ("FBX_SCALE_ALL", "In the File", "Objects have scale 1, as Unity expects"),
+            (
+                "FBX_SCALE_NONE",
+                "On Objects",
+                "The unit is the scale of the objects, which is 100, as Unreal expects",
+            ),
+            (
+                "FBX_SCALE_ALL",
+                "In the File",
+                "The file states the unit, and objects have scale 1, as Unity expects",
+            ),
         ),
     )
     lod_groups: bpy.props.BoolProperty(

@@ -46,7 +46,9 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
     baked_too = True
 
     again: bpy.props.BoolProperty(
-        name="All Anew", description="Draw existing pictures again", options={"SKIP_SAVE"}
+        name="All Anew",
+        description="Also draw the pictures that already exist",
+        options={"SKIP_SAVE"},
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:

@@ -46,7 +46,8 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
         follows = self.lod == lods.SAME and self.target == "RENDER"
         if not follows and self.lod not in lods.built(rig):
             self.report(
-                {"ERROR"}, say("Level {level} was not built for this face.", level=self.lod)
+                {"ERROR"},
+                say("The level of detail {level} was not built for this face.", level=self.lod),
             )
             return {"CANCELLED"}
         lods.follow_camera(rig, False)

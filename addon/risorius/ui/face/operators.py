@@ -114,7 +114,7 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, Operator):
 
 
 class RISORIUS_OT_hide_joints(FaceOperator, Operator):
-    """Hide the joints of this face: in Direct mode they are not posed"""
+    """Hide the joints of this face: Direct mode does not pose hidden joints"""
 
     bl_idname = "risorius.hide_joints"
     bl_label = "Hide Joint Rig"

@@ -54,7 +54,7 @@ class RISORIUS_OT_mirror(HandOperator, Operator):
 
 
 class RISORIUS_OT_copy_side(HandOperator, Operator):
-    """Make one side of the face like the other; the gaze stays"""
+    """Make one side of the face like the other; the direction of the gaze does not change"""
 
     bl_idname = "risorius.copy_side"
     bl_label = "Copy to Other Side"
@@ -112,7 +112,7 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
 
 
 class RISORIUS_OT_copy_pose(FaceOperator, Operator):
-    """Copy the visible pose, including layers, for this face or another"""
+    """Copy the visible pose, including layers, to paste it onto this or another face"""
 
     bl_idname = "risorius.copy_pose"
     bl_label = "Copy Face"

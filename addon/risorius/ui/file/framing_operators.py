@@ -20,7 +20,7 @@ _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = session.keep(
 
 
 class RISORIUS_OT_frame_face(FaceOperator, Operator):
-    """Fit the whole head into the view, without its outlines and face board"""
+    """Fit the whole head into the view; outlines and face board may be outside the view"""
 
     bl_idname = "risorius.frame_face"
     bl_label = "Frame Face"
@@ -55,7 +55,7 @@ def _only_outlines(context: Context) -> bool:
 
 
 class RISORIUS_OT_hide_outlines(FaceOperator, Operator):
-    """Hide the outlines of head, neck and eyes, or show them again; keys stay in the editors"""
+    """Hide or show the outlines of head, neck and eyes; the editors still show their keys"""
 
     bl_idname = "risorius.hide_outlines"
     bl_label = "Hide Outlines"
@@ -73,7 +73,7 @@ class RISORIUS_OT_hide_outlines(FaceOperator, Operator):
 
 
 class RISORIUS_OT_move_outlines(FaceOperator, Operator):
-    """Move the outlines of an older file from the eyes to the side of the face"""
+    """Move outlines that an older Risorius placed on the eyes to the side of the face"""
 
     bl_idname = "risorius.move_outlines"
     bl_label = "Move Outlines Beside Face"

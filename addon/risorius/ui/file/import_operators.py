@@ -283,7 +283,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
             return self._import(context)
         if isinstance(error, OSError):
             trouble = words.say(
-                "The sample face could not be kept in Blender's folder for extensions: {reason}. "
+                "The sample face could not be stored in Blender's folder for extensions: {reason}. "
                 "See that you may write there and that the disk has room.",
                 reason=(error.strerror or "").rstrip("."),
             )

@@ -155,7 +155,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         taken = shape_key_head.taken_with(context, head)
         column = self.layout.column()
         words.write(
-            column, words.say("The face is made of {names}", names=names.listed(_named(taken)))
+            column, words.say("Meshes of the new face: {names}", names=names.listed(_named(taken)))
         )
         family = shape_key_head.relatives_of(context, taken)
         if family:
@@ -223,7 +223,8 @@ def show_made(
     operator.report(
         {"INFO"},
         words.say(
-            "{count} joints; shape-key deltas {before} -> {after}; largest vertex error {mm} mm",
+            "{count} joints; vertices moved by shape keys: {before} before, {after} after; "
+            "largest error of a vertex: {mm} mm",
             count=len(rig.new_joints),
             before=rig.deltas_before,
             after=rig.deltas_after,

@@ -49,7 +49,7 @@ def _is_ours(item: bpy.types.KeyMapItem) -> bool:
 
 
 class RISORIUS_OT_shortcut(Operator):
-    """Add a shortcut for the pie menu of the face, changeable here, or remove the shortcut"""
+    """Add a keyboard shortcut for the pie menu of the face, or remove the shortcut"""
 
     bl_idname = "risorius.shortcut"
     bl_label = "Key for the Pie Menu"

@@ -37,7 +37,7 @@ class LayerOperator(FaceOperator):
 
 
 class RISORIUS_OT_layer_add(FaceOperator, Operator):
-    """Add a layer on top of the others: an action at its own frames, others at the current frame"""
+    """Add a layer on top: an action at its first frame, another source at the current frame"""
 
     bl_idname = "risorius.layer_add"
     bl_label = "Add Layer"
@@ -109,7 +109,7 @@ class RISORIUS_OT_layer_remove(LayerOperator, Operator):
 
 
 class RISORIUS_OT_layer_move(LayerOperator, Operator):
-    """Move the active layer up or down; higher layers lie over lower ones"""
+    """Move the active layer up or down; a higher layer is applied after the lower layers"""
 
     bl_idname = "risorius.layer_move"
     bl_label = "Move Layer"

@@ -150,7 +150,7 @@ class _Waiting(OperatorBase):
 
 
 class RISORIUS_OT_live_finish(_Waiting, Operator):
-    """Put a waiting recording on the active face"""
+    """Make a waiting recording an action of the active face"""
 
     bl_idname = "risorius.live_finish"
     bl_label = "Finish"
@@ -200,7 +200,9 @@ class RISORIUS_OT_live_neutral(_Running, Operator):
     bl_label = "Neutral Now"
 
     forget: bpy.props.BoolProperty(
-        name="Forget", description="Use received faces unchanged again", options={"SKIP_SAVE"}
+        name="Forget",
+        description="Forget the neutral face: received faces are used unchanged",
+        options={"SKIP_SAVE"},
     )
 
     def execute(self, context: Context) -> Result:

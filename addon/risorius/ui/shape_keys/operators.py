@@ -181,7 +181,7 @@ class RISORIUS_OT_choose_shape_key(Says, Operator):
 
 
 class RISORIUS_OT_select_shape_key(OfHead, Operator):
-    """Make this shape key the active one"""
+    """Make this shape key the active shape key"""
 
     bl_idname = "risorius.select_shape_key"
     bl_label = "Select Shape Key"
@@ -272,7 +272,9 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
     bl_options = set()
 
     again: bpy.props.BoolProperty(
-        name="All Anew", description="Draw existing pictures again", options={"SKIP_SAVE"}
+        name="All Anew",
+        description="Also draw the pictures that already exist",
+        options={"SKIP_SAVE"},
     )
     use_choices: bpy.props.BoolProperty(
         name="Pictures of Controls",

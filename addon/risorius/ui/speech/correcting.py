@@ -182,7 +182,7 @@ class RISORIUS_OT_sound_insert(_CorrectsSound, Operator):
 
 
 class RISORIUS_OT_sound_remove(_CorrectsSound, Operator):
-    """Remove the chosen sound; a neighbouring sound fills its time. The keys of the mouth follow"""
+    """Remove the chosen sound and extend the sound before it, or else after it; keys follow"""
 
     bl_idname = "risorius.sound_remove"
     bl_label = "Remove Sound"

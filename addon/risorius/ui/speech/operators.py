@@ -46,7 +46,8 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         description="Spoken words in English; empty: recognise the sounds without the words",
     )
     transcript_text: bpy.props.StringProperty(
-        name="Text", description="A text of this file that holds the transcript"
+        name="Text",
+        description="Text data-block of this .blend file that contains the spoken words",
     )
     intensity: bpy.props.FloatProperty(
         name="Intensity",

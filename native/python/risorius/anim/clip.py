@@ -400,7 +400,7 @@ class ClipReader:
             raise ClipError(
                 f"{count:,} controls of {end - begin:,} frames take {needed:,} bytes, at most "
                 f"{MOST_BYTES + BYTES_PER_BYTE * self._size:,} were expected of a file of "
-                f"{self._size:,}: read it in parts (frames, controls)"
+                f"{self._size:,} bytes: read it in parts (frames, controls)"
             )
         wanted = None if controls is None else [self._index[name] for name in controls]
         curves, times = self._file.read(begin, end, wanted)

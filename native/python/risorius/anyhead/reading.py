@@ -37,7 +37,7 @@ def read_head(path: Path) -> tuple[list[HeadPart], str]:
     if path.is_dir():
         files = sorted(path.glob("*.obj"))
         if not files:
-            raise AnyHeadError(f"{path}: a folder with OBJ files was expected, found none")
+            raise AnyHeadError(f"{path}: a folder with OBJ files was expected, found no OBJ file")
         return [part for file in files for part in _obj_parts(file)], "cm"
     suffix = path.suffix.lower()
     if suffix in gltf.SUFFIXES:

@@ -193,7 +193,7 @@ def require_sizes(dna: Dna) -> None:
         if len(points):
             spread = max(spread, float(np.ptp(points, axis=0).max()))
     if not spread:
-        raise ArgumentError("a mesh of some size was expected, found vertices in one point")
+        raise ArgumentError("a mesh of some size was expected, found all vertices at one point")
 
 
 def _check_size(dna: Dna, count: int, together: Container[int]) -> None:

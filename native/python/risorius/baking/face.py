@@ -159,7 +159,9 @@ def prepared(
             start=float(times[0]) if times.size else clip.start,
         )
     if not clip.frame_count:
-        raise ArgumentError(f"a clip with frames was expected, found {found}, 0 of them requested")
+        raise ArgumentError(
+            f"a clip with frames was expected, found {found} frames, of which 0 were requested"
+        )
     return with_head_turns(clip, face)
 
 

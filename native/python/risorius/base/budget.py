@@ -90,6 +90,6 @@ def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
     if not count <= left:  # True for NaN too
         raise BudgetError(
             f"{wanted} more than the {most - left:,} {done} before would be needed, "
-            f"at most {most:,} in total were expected for input of this size"
+            f"but at most {most:,} in total are allowed for input of this size"
         )
     return left - int(count)

@@ -203,7 +203,9 @@ class Parser:
         count, encoding, size = self._length(at, end, 12)
         start = at + 12
         if start + size > end or encoding not in (0, 1):
-            raise self.fail(at, f"an array of {count} in {size} bytes does not fit its record")
+            raise self.fail(
+                at, f"an array of {count} values in {size} bytes does not fit its record"
+            )
         return Packed(self, dtype, count, encoding == 1, start, size), start + size
 
 

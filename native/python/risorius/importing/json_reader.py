@@ -168,7 +168,7 @@ class Reader:
         for name, curve in zip(names, curves, strict=True):
             holes = np.isnan(curve)
             if holes.all() and holes.size:
-                raise self.fail("numbers were expected, found null alone", name)
+                raise self.fail("numbers were expected, found only null", name)
             if holes.any():
                 curve[holes] = np.interp(times[keep][holes], times[keep][~holes], curve[~holes])
                 self.notes.append(f"{name}: null in {int(holes.sum())} frame(s), filled")

@@ -403,7 +403,10 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
         if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
             raise MappingError(
                 where,
-                (f"rows: {key} is in the base with another spelling: use the spelling of the base"),
+                (
+                    f"rows: {key} is in the base with another spelling: use the spelling of the "
+                    "base mapping"
+                ),
             )
     shares = _shares(_table(table, "shares", where), prefix, where)
     controls = {

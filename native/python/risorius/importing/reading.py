@@ -426,7 +426,8 @@ def _keys(name: str, times: npt.ArrayLike, values: npt.ArrayLike) -> Keys:
     t, v = np.asarray(times, np.float64), np.asarray(values, np.float64)
     if t.ndim != 1 or t.shape != v.shape:
         raise ArgumentError(
-            f"{name}: as many values as times were expected, found {v.shape}, {t.shape}"
+            f"{name}: as many values as times were expected, "
+            f"found the shapes {v.shape} and {t.shape}"
         )
     if not (np.isfinite(t).all() and np.isfinite(v).all()):
         raise ArgumentError(f"{name}: finite times and values were expected")

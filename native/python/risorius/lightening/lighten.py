@@ -209,7 +209,7 @@ def _require_finite(dna: Dna) -> None:
             raise ArgumentError(f"joint group {number}: finite coefficients were expected")
     rest = (dna.neutral_joint_translations, dna.neutral_joint_rotations)
     if not all(np.isfinite(values).all() for values in rest):
-        raise ArgumentError("joints: finite places and rotations were expected")
+        raise ArgumentError("joints: finite positions and rotations were expected")
 
 
 def _require_parts(

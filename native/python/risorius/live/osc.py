@@ -58,7 +58,7 @@ def messages(data: bytes, depth: int = 0) -> Iterator[tuple[str, list[Any]]]:
     place = 16
     while place < len(data):
         if len(data) < place + 4:
-            raise LiveError("a bundle that is cut short")
+            raise LiveError("a complete OSC bundle was expected, found one that is cut short")
         (size,) = struct.unpack_from(">i", data, place)
         place += 4
         if size <= 0 or size % 4 or place + size > len(data):
@@ -94,7 +94,9 @@ def _message(data: bytes) -> tuple[str, list[Any]]:
         message = OscMessage(data)
         return message.address, message.params
     except (ParseError, ValueError, IndexError, struct.error) as error:
-        raise LiveError("a message of OSC that is cut short") from error
+        raise LiveError(
+            "a complete OSC message was expected, found one that is cut short"
+        ) from error
 
 
 class Decoder:

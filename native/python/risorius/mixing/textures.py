@@ -115,8 +115,8 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
         there = texture_folder(path) / name
         if there.exists():
             raise ArgumentError(
-                f"{there}: a picture of this name is there, and no {path.name} to which it "
-                "belongs: choose another name for the new face"
+                f"{there}: a picture of this name is there, and no {path.name} that uses it: "
+                "choose another name for the new face"
             )
 
 

@@ -103,7 +103,7 @@ def _arrays(path: str | os.PathLike[str]) -> Performance:
     for name in ("vertices", "neutral", "rate"):
         if name in values and values[name].dtype.kind not in "fiu":
             raise PerformanceError(
-                f"{path}: {name} of numbers was expected, found {values[name].dtype}"
+                f"{path}: an array {name} of numbers was expected, found {values[name].dtype}"
             )
     given = values.get("rate", np.float64(30.0))
     rate = float(given.item()) if given.size == 1 else np.nan

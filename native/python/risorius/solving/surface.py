@@ -257,7 +257,9 @@ def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:
     """
     out = numbers(name, values)
     if out.shape not in ((), (count,)):
-        raise ArgumentError(f"{name}: {count} numbers were expected, found {list(out.shape)}")
+        raise ArgumentError(
+            f"{name}: {count} numbers were expected, found the shape {list(out.shape)}"
+        )
     return np.array(np.broadcast_to(out, (count,)))
 
 

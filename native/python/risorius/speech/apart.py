@@ -178,7 +178,7 @@ def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterat
             if monotonic() - heard > _PATIENCE:
                 raise RecogniserError(
                     f"the process of the speech recogniser said nothing for {_PATIENCE:g} s and "
-                    "was ended"
+                    "was stopped"
                 ) from None
             continue
         if not line:

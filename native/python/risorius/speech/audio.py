@@ -100,7 +100,9 @@ def parse_wav(data: bytes) -> tuple[Samples, int]:
         begin = offset + 8
         if name == b"data":
             if form is None:
-                raise AudioError(f"byte {offset}: samples before the fmt chunk that describes them")
+                raise AudioError(
+                    f"byte {offset}: samples before the fmt chunk, which describes them, were found"
+                )
             return _decode(_body(data, begin, size), form), form.rate
         if begin + size > len(data):
             raise AudioError(

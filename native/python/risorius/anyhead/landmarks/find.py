@@ -157,7 +157,9 @@ def _looked_at(target: Surface, hints: Hints, tell: Progress) -> tuple[Target, P
         others = parts if len(parts) > 1 else []
     heads = [(part, best) for part, best in _heads(others, hints, tell) if best.error <= NO_FACE]
     if len(heads) + (best.error <= NO_FACE) > 1:
-        raise LandmarkError(f"{hints.where}: one head was expected, found two: choose the mesh")
+        raise LandmarkError(
+            f"{hints.where}: one head was expected, found two: choose the mesh of one head"
+        )
     if best.error <= NO_FACE:
         return seen, best.pose, best.error
     if heads:

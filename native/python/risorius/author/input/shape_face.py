@@ -83,7 +83,9 @@ def check_shapes(shapes: ShapeSet, go_on: Callable[[], object] = lambda: None) -
     if not np.abs(shapes.mesh.positions).max(initial=0.0) <= FARTHEST:
         raise ArgumentError(_too_large("the neutral mesh", shapes.mesh.positions))
     if not size:
-        raise ArgumentError("the neutral mesh: some size was expected, found vertices in one point")
+        raise ArgumentError(
+            "the neutral mesh: some size was expected, found all vertices at one point"
+        )
     notes: list[str] = []
     seen: dict[bytes, str] = {}
     moving = 0

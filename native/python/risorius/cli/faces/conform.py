@@ -112,7 +112,9 @@ def _check(args: argparse.Namespace) -> None:
     for name in _NOT_ITS:
         if getattr(args, name, None) not in (None, False):
             said = name.replace("_", "-")
-            raise CommandLineError(f"author: --conform takes no --{said}: the face has its rig")
+            raise CommandLineError(
+                f"author: --conform takes no --{said}, because the face has a rig already"
+            )
     if args.spec is None:
         raise CommandLineError("author: --conform HEAD FACE.dna was expected, found no FACE.dna")
     if args.out is None:

@@ -109,7 +109,8 @@ def check_arguments(args: argparse.Namespace) -> None:
         return
     if args.names is not None:
         raise CommandLineError(
-            "author: --names is of a head with expressions and is not possible with --onto"
+            "author: --names is of a head with expressions and is not possible with --onto, "
+            "whose head has none"
         )
     if args.out is None:
         raise CommandLineError("author: -o OUT.dna was expected")

@@ -137,7 +137,9 @@ class Meshes:
         at = f"skins[{row['skin']}].inverseBindMatrices"
         found = self._document.rows(skin["inverseBindMatrices"], at, "MAT4", FLOATS)
         if len(found) < len(joints):
-            raise self._document.fail(at, f"{len(joints)} were expected, found {len(found)}")
+            raise self._document.fail(
+                at, f"{len(joints)} matrices were expected, found {len(found)}"
+            )
         inverse = found[: len(joints)].reshape(-1, 4, 4).swapaxes(1, 2)
         return np.asarray(world @ inverse, np.float64)
 
