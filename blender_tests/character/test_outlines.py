@@ -56,7 +56,10 @@ def test_from_the_front_no_outline_lies_over_the_eyes_and_all_lie_near_the_head(
 
 
 def test_outlines_of_an_older_file_move_beside_the_face(dna_file, tmp_path):
-    """Outlines that an older version of the add-on saved over the eyes move beside the face."""
+    """Outlines that an older version placed over the eyes stay there until an operator is called.
+
+    The operator moves them beside the face; a second call finds nothing to move.
+    """
     made = "4.2.23"
     folder = shutil.copytree(past.DATA / made, tmp_path / made)
     bpy.ops.wm.open_mainfile(filepath=str(folder / "bones.blend"))

@@ -563,9 +563,10 @@ def test_another_number_of_vertices(pair):
 
 
 def test_a_modifier_that_was_disabled_before_direct_mode(pair):
-    """A modifier that the user disabled before Direct mode stays disabled in Direct mode.
+    """An armature modifier that the user disabled stays disabled when the face gets Direct mode.
 
-    The mesh then is not in Direct mode, and the plan names it.
+    The modifier's mesh is left out of Direct mode, and the plan's reason names the mesh. When the
+    user enables the modifier again, the mesh is in Direct mode.
     """
     rig, head = pair.live, scene.meshes(pair.live)[0]
     _armature(head).show_viewport = False

@@ -102,8 +102,9 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   }
 }
 
-// Checks group_columns: the values that a kernel reads for a column of the group, its rows rounded
-// up to whole vectors, must be inside the matrices, and its control must exist.
+// Checks group_columns. A kernel computes whole SIMD registers, so from each column it may read as
+// many values as the group has rows, rounded up to a multiple of simd::kWidest. These values must
+// be inside the matrices, and the control of the column must exist.
 void check_group_columns(const Rig& r, std::uint64_t values, IndexCheck& c) {
   std::size_t i = 0;
   for (const JointGroup& g : r.joint_groups) {

@@ -111,9 +111,9 @@ struct alignas(128) Workspace {
   // groups write joint attributes: all other blocks of the pose are then 0 already. Empty: the
   // content of the pose is unknown.
   std::vector<std::uint64_t> shown_blocks;
-  // Rotations by quaternions.
-  // If poses have quaternions: the joints whose quaternion is not computed from Euler angles at any
-  // LOD. If poses have Euler angles: empty.
+  // The next three lists are for rotations by quaternions.
+  // If poses have quaternions: the joints whose quaternion is computed from Euler angles at no LOD;
+  // each evaluation first sets it to the identity. If poses have Euler angles: empty.
   std::vector<std::uint16_t> straight_joints;
   std::vector<Quaternion> products;  // [quaternion joints]
   // A bit for each column of Rig::quaternion_columns: 1 if the column's control is not 0. All bits

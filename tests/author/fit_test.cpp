@@ -311,8 +311,8 @@ TEST(Fit, WhatIsMoreImportantComesNearer) {
     Shapes left = shapes;
     for (std::size_t v = 0; v < left.vertex_count(); ++v) {
       if (left.neutral[v][0] > 0.0) continue;
-      // Only errors of the left side count. So the vertices of the right side get no displacement,
-      // and weights only on a joint that does not move.
+      // Only errors of the left side shall count. Therefore the right side is changed to have no
+      // error: its goal is the rest pose, and all its weights go to joint 0, which does not move.
       for (std::size_t e = 0; e < left.expressions; ++e) {
         for (std::size_t k = 0; k < 3; ++k) at(left, v, e, k) = 0.0f;
       }

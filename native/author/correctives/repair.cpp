@@ -454,9 +454,11 @@ Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& fault
   return best;
 }
 
-/// Whether the best repair makes nothing worse in the whole skin. The whole skin is checked because
-/// the moved vertices may enter skin outside of work.region.
-/// In:     allowed    the faults that the caller allows
+/// Whether the best repair makes nothing worse than before the repair (see is_no_worse) in the
+/// whole skin. The whole skin is checked because the moved vertices may enter skin outside of
+/// work.region. If true, faults beyond the allowed ones may still be left.
+/// In:     first      faults of the pose before the repair
+///         allowed    the faults that the caller allows
 /// In/out: best.sums  if true: the faults beyond `allowed` after the repair
 bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best) {
   work.x = best.x;

@@ -2,7 +2,7 @@
 """Tests `risorius export`: the exported file moves like the rig, and limits are reported.
 
 gltf_oracle.py reads the file and dna_bytes.py evaluates the rig; neither shares code with the
-exporter. packaging/ship/gameface.sh tests three.js and gltf-validator.
+exporter. packaging/ship/gameface.sh tests exported files in three.js and with gltf-validator.
 """
 
 import json

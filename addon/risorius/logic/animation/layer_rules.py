@@ -86,8 +86,9 @@ class Span:
     def source(self, frames: Float) -> Float:
         """The source's frames that the layer shows at given frames of the scene.
 
-        Before the start and after the end, the source repeats; a warp holds its first and last
-        frame.
+        Without a warp, the source repeats without end, also at scene frames before and after the
+        layer. With a warp, scene frames before its first point show the source's frame of that
+        point, and scene frames after its last point show the source's frame of the last point.
         """
         if self.warp is not None:
             return np.interp(frames, *self.warp)

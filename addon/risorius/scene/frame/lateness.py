@@ -42,9 +42,11 @@ _others: dict[int, _Late] = session.table("lateness.others", ("undo", "load"))
 
 
 def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
-    """Whether it is known that the inputs of a face depend on this or another face.
+    """Whether `note_circle` has recorded that the inputs of a face depend on this or another face.
 
-    The record is dropped if parents, drivers or constraints have changed.
+    A dependence on another face counts even if that face does not depend on this one. If the
+    parent, drivers or constraints of the control armature have changed since the record was made,
+    this call drops the record, and the result is False.
 
     Args:
         rig, controls: deforming and control armature of the face.

@@ -48,8 +48,9 @@ class Heat:
     """The contents of a heat map.
 
     Attributes:
-        kind: CONTROL: motion of a control from rest to 1; POSE: distance of the current pose from
-            neutral; CORRECTIVE, LAYER: motion that one corrective or layer adds to the pose.
+        kind: CONTROL: motion from neutral if one control changes from its rest value, which may
+            differ from 0, to 1; POSE: distance of the current pose from neutral; CORRECTIVE,
+            LAYER: motion that one corrective or layer adds to the pose.
         what: label of the control, index of the corrective, or index of the layer.
         most: largest motion in millimetres; it gets the hottest colour if it is 0.01 or more.
     """

@@ -204,7 +204,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
 
 
 class RISORIUS_OT_conform_face(_Makes, Operator):
-    """Give a face the form of the selected head; the face keeps its topology, names and controls"""
+    """Copy a face; the copy gets the selected head's form and keeps topology, names and controls"""
 
     bl_idname = "risorius.conform_face"
     bl_label = "Conform Face to Head"

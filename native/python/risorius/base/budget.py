@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limits on memory and work for reading a file, in proportion to its size.
+"""Limits on memory and work for reading a file: a constant plus a part in proportion to its size.
 
 A few bytes of a file may demand gigabytes: compressed arrays, a thousand curves that share one
 array, two frames a year apart. Therefore each reader takes bytes and steps from the budget before

@@ -184,12 +184,19 @@ def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
 
 
 def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | None, Doubles]:
-    """The networks' rotation convention or None, and the matrix from the networks' axes to the
-    face's axes.
+    """The rotation convention of the neural networks that move joints, and the matrix from the
+    networks' axes to the face's axes.
+
+    None and the identity matrix if the file does not give all parameters of the networks' axes and
+    convention; the networks then use those of the face.
 
     Args:
         dna: the face.
         settings: key of a parameter of layer mlbe -> its value.
+
+    Returns:
+        The convention or None; and float64[3, 3], whose row i is the networks' axis i in the
+        face's axes.
     """
     if not all(key in settings for key in range(3, 10)):
         return None, np.eye(3)

@@ -275,7 +275,11 @@ class Receiver:
         return take
 
     def finish(self, take: Take) -> Take:
-        """Ends a recording, and returns its take."""
+        """Ends a recording, and returns its take.
+
+        Args:
+            take: the take that `record` returned; this same object is returned.
+        """
         with self._lock:
             if take in self._takes:
                 self._takes.remove(take)

@@ -285,15 +285,16 @@ def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna 
 def _shapes_go_on(
     face: _Posed, control: int, ways: Doubles, holds: Mapping[int, Hold], change: Change
 ) -> Dna | None:
-    """The face with displacements added to the blend shapes of a control; None if the control has
-    none.
+    """The face with displacements added to the blend shapes of a control, on the skin and on the
+    meshes that follow it; None if none of them has a blend shape of the control.
 
     Args:
         face: the face.
         control: index of the raw control.
-        ways: float64[V, 3], the displacements to add to the posed skin.
+        ways: float64[V, 3], displacements of the skin as it is posed with the control at 1. They
+            are converted to displacements before skinning.
         holds: bindings of the meshes that follow the skin, by mesh index.
-        change: the deformation of the skin.
+        change: the deformation from the source head to the target head.
     """
     dna = face.dna
     channels = dna.blend_shape_channels

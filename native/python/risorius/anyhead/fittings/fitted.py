@@ -72,10 +72,10 @@ class Bodies:
     """Positions of teeth and gums in each expression. The skin must not cut into them."""
 
     def __init__(self, fittings: Fittings, skin: Surface, shapes: Mapping[str, Doubles]) -> None:
-        """Find the jaw's motion in each expression.
+        """Find the jaw's motion in each expression, from the skin and its displacements.
 
         Args:
-            fittings: the meshes of the target.
+            fittings: the meshes of the target; only its teeth and gums are used.
             skin: the skin of the target in the rest pose.
             shapes: float64[V, 3] by raw control, displacements of the skin.
         """

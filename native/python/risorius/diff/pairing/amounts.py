@@ -56,7 +56,7 @@ def length(amount: float, unit: str) -> str:
 
 
 def angle(amount: float, unit: str) -> str:
-    """An angle as text, e.g. "0.5 degrees".
+    """An angle as text, always in degrees, e.g. "0.5 degrees".
 
     Args:
         amount: angle in the file's rotation unit.
