@@ -113,8 +113,8 @@ def words(rig: ArmatureObject) -> str:
     if not count:
         return ""
     return told(
-        "Simulations here were baked by an older Risorius, which used the face "
-        "of the previous frame: bake them again (caches: {count}).",
+        "Simulations in the scenes of this face were baked by an older Risorius, which used the "
+        "face of the previous frame: bake them again (caches: {count}).",
         count=count,
     )
 

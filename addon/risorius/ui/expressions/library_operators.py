@@ -161,7 +161,7 @@ def _put(
 
 
 class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
-    """Save the current pose as an expression: an asset of this file, or a file of the library"""
+    """Save the current pose as an asset of this file and, if chosen, also in the library"""
 
     bl_idname = "risorius.save_expression"
     bl_label = "Save Expression"

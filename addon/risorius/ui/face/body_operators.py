@@ -61,8 +61,8 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
                 "SCALE",
                 "On the Head, Scaled",
                 (
-                    "Move the face to the head bone of the body, and scale the face to the "
-                    "length of the body's neck"
+                    "Move the face to the head bone of the body, and scale the face so that "
+                    "its neck is as long as the neck of the body"
                 ),
             ),
             ("NONE", "Where It Is", "Keep the place of the face"),

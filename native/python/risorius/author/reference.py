@@ -227,7 +227,7 @@ def refit(
     }
     if sorted(weights) != sorted(shaped):
         raise ArgumentError(
-            "an expression moves meshes that do not move in the face given with the option like"
+            "an expression moves a mesh that has no weights in the reference (argument 'like')"
         )
     used = given(work)
     own = np.concatenate([used, np.arange(len(reference.names)) + len(dna.joint_names)])

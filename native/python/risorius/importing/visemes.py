@@ -511,8 +511,8 @@ def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: st
         raise AnimationFileError(
             name,
             (
-                f"voice {voice!r}: frames of 0 or more, none before the previous frame, were "
-                "expected"
+                f"voice {voice!r}: phonemes and ends of words in the order of their frames, from "
+                "frame 0, were expected"
             ),
         )
     cues = _from_starts(

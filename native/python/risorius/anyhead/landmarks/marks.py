@@ -116,7 +116,9 @@ def read_landmarks(path: str | os.PathLike[str]) -> Landmarks:
         raise LandmarkError(f"{path}: version: {_VERSION} was expected, found {found}")
     rows = table.get("landmarks")
     if not isinstance(rows, dict):
-        raise LandmarkError(f"{path}: landmarks: a table was expected, found {shown(rows)}")
+        raise LandmarkError(
+            f"{path}: landmarks: a table was expected (a JSON object), found {shown(rows)}"
+        )
     out = Landmarks()
     for name, row in rows.items():
         _take(out, f"{path}: landmarks.{name}", name, row)

@@ -277,7 +277,9 @@ def _axes(scene: Scene) -> Doubles:
     def axis(name: str, default: int) -> Doubles:
         at, sign = rows.get(f"{name}Axis", default), rows.get(f"{name}AxisSign", 1)
         if at not in (0, 1, 2) or sign not in (1, -1):
-            raise ShapeFileError(f"{scene.name}: GlobalSettings: {name}Axis of 0, 1 or 2 expected")
+            raise ShapeFileError(
+                f"{scene.name}: GlobalSettings: {name}Axis of 0, 1 or 2 with sign 1 or -1 expected"
+            )
         out = np.zeros(3)
         out[at] = sign
         return out
