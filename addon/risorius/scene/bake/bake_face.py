@@ -180,11 +180,7 @@ def level_of(rig: ArmatureObject, lod: int) -> int:
     level = lods.viewport_level(rig) if lod < 0 else lod
     there = lods.built(rig)
     if there and level not in there:
-        raise BakeError(
-            told(
-                "The level of detail {level} was not built for {face}.", level=level, face=rig.name
-            )
-        )
+        raise BakeError(told("Level {level} was not built for {face}.", level=level, face=rig.name))
     return min(level, max(runtime.there(rig).rig.lod_count - 1, 0))
 
 

@@ -136,7 +136,7 @@ def content(text: object) -> bytes:
         raise ContentError(told("the text data-block contains no bytes of a DNA file"))
     content = _unpack(packed, _limit(text, packed))
     if hash_of(content) != content_hash(text):
-        raise ContentError(told("the stored bytes differ from the imported DNA file"))
+        raise ContentError(told("its bytes differ from the imported file"))
     return content
 
 
@@ -157,11 +157,11 @@ def _limit(text: bpy.types.Text, packed: bytes) -> int:
     if said is None:
         return _most(packed)
     if not isinstance(said, str) or not said.isdecimal() or len(said) > 15:
-        raise ContentError(told("the stored length of the DNA file is no number"))
+        raise ContentError(told("the stored length of its file is no number"))
     if int(said) > _most(packed):
         raise ContentError(
             told(
-                "the stored length of the DNA file is {said:,} bytes, but its {packed:,} packed "
+                "its stored length is {said:,} bytes, but its {packed:,} packed "
                 "bytes can contain at most {most:,}",
                 said=int(said),
                 most=_most(packed),
@@ -188,24 +188,20 @@ def _unpack(packed: bytes, limit: int) -> bytes:
         try:
             piece = unpacking.decompress(rest, min(_PIECE, limit - count + 1))
         except zlib.error as error:
-            raise ContentError(
-                told("the stored bytes of the DNA file cannot be unpacked")
-            ) from error
+            raise ContentError(told("its bytes cannot be unpacked")) from error
         rest = unpacking.unconsumed_tail
         count += len(piece)
         if not pieces and not piece.startswith(_SIGNATURE[: len(piece)]):
             raise ContentError(
                 told(
-                    "the stored DNA file begins with {piece!r} instead of {signature!r}",
+                    "its bytes begin with {piece!r} instead of {signature!r}",
                     piece=piece[:3],
                     signature=_SIGNATURE,
                 )
             )
         if count > limit:
-            raise ContentError(
-                told("the stored bytes unpack to more than {limit:,} bytes", limit=limit)
-            )
+            raise ContentError(told("its bytes unpack to more than {limit:,} bytes", limit=limit))
         if not piece and not rest and not unpacking.eof:
-            raise ContentError(told("the stored bytes of the DNA file end too early"))
+            raise ContentError(told("its bytes end too early"))
         pieces.append(piece)
     return b"".join(pieces)

@@ -28,8 +28,8 @@ def words(rig: ArmatureObject) -> Iterator[str]:
         return
     if _has_joint_keys(rig):
         yield told(
-            "Keys on joints of {rig} override the sliders: from the next frame on, the "
-            "sliders do not move these joints. Mute or remove the action of {rig}.",
+            "Keys on joints of {rig} lead: from the next frame on, the sliders do "
+            "not move these joints. Mute or remove the action of {rig}.",
             rig=rig.name,
         )
     if rig.get(parts.FOLLOW) and _is_sheared(controls):

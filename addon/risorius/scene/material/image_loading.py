@@ -173,11 +173,9 @@ class Images:
         if self._room + room > limit:
             raise ValueError(
                 told(
-                    (
-                        "The texture {file} was not loaded: together with the textures loaded "
-                        "before, it needs {room:,} bytes of memory; at most {limit:,} are allowed "
-                        "for files of their size."
-                    ),
+                    "The texture {file} stays away: together with the textures "
+                    "before it, it needs {room:,} bytes, at most {limit:,} are "
+                    "allowed for files of their size.",
                     file=path.name,
                     room=self._room + room,
                     limit=limit,

@@ -47,7 +47,7 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
         if not follows and self.lod not in lods.built(rig):
             self.report(
                 {"ERROR"},
-                say("The level of detail {level} was not built for this face.", level=self.lod),
+                say("Level {level} was not built for this face.", level=self.lod),
             )
             return {"CANCELLED"}
         lods.follow_camera(rig, False)

@@ -62,9 +62,7 @@ def _draw_waiting(layout: UILayout) -> None:
         box = layout.box()
         count = len(recording.take)
         text = words.say(
-            "{name}: recording of {count} frames, not finished",
-            name=recording.face,
-            count=count,
+            "{name}: {count} faces wait in a recording", name=recording.face, count=count
         )
         words.show(box, names.printable(text, 60), "REC")
         row = box.row(align=True)

@@ -87,7 +87,7 @@ def checked(table: Mapping[str, Any], version: str, where: str) -> dict[str, Any
             )
     if missing := [field for field in asked if field not in table]:
         raise GameFaceError(
-            f"{where}: VRM {version} asks for {joined(missing)}: state each "
+            f"{where}: VRM {version} asks for {joined(missing)}: say each "
             "of these fields, because Risorius assumes no licence"
         )
     return dict(table)
