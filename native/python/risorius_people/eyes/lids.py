@@ -236,9 +236,9 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
     """Two displacements from the rest pose that close the lids, float64[V, 3] each.
 
-    The first lays both lids on one line. The second is the data's displacement, scaled in each
-    column of the grid by 0.2 to 1.2 so that the upper lid ends at the lower lid. Outside the grid
-    both are equal.
+    The first lays both lids on one line: in each column of the grid, the data's displacement of the
+    upper lid is scaled so that this lid ends at the lower lid. The second is the data's
+    displacement, scaled by _AROUND everywhere. Outside the grid both are equal.
 
     Args:
         lids: the lids in their rest pose.

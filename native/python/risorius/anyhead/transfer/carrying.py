@@ -138,7 +138,8 @@ class Carrying:
 
         Args:
             way: float64[V, 3], the displacement on the template.
-            pose: the pose whose motion of the jaw is in the displacement.
+            pose: the pose whose motion of the jaw is in the displacement; the displacement is
+                transformed by the deformation gradients alone if the pose does not move the jaw.
         """
         jaw, change = self._face.jaw, self._jaw
         if jaw is None or change is None or pose not in jaw.turns:
