@@ -48,10 +48,11 @@ bool rests_any(const Rig& rig, const Psd& psd, auto rests) noexcept {
   return std::any_of(factors, factors + psd.factor_count, rests);
 }
 
-// Lists the watched correctives that can differ from 0. A new list has those whose watcher and
-// Watch::other are not 0; their further factors are not tested, because that takes longer than it
-// saves if the list is used only once. If the evaluation before had the same active controls, its
-// list is used again. At the first such use, correctives with any factor at 0 are removed from it.
+// Lists the watched correctives that can differ from 0. A new list has the correctives of which two
+// factors, the control that watches the corrective and Watch::other, are not 0. Their further
+// factors are not tested, because that takes longer than it saves if the list is used only once.
+// If the evaluation before had the same active controls, its list is used again. At
+// the first such use, correctives with any factor at 0 are removed from it.
 // In:  kept    the evaluation before had the same active controls
 //      rests   rests(control): whether a control is 0
 // Out: work    firing, firing_count, fires_all (true: such correctives have been removed)

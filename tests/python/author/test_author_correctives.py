@@ -309,8 +309,8 @@ def test_the_written_file_stays_out_of_the_ball_at_every_level(corrected, names)
         plain, _ = sheet(SIDE if lod == 0 else 21)
         linear = plain + sum(push(plain, *PUSHES[name]) for name in names)
         assert depth(linear).max() > 0.6
-        # Vertices away from the ball move by the sum of both pushes. Every vertex goes down at
-        # least as far as by the weaker of its two pushes.
+        # Vertices away from the ball move by the sum of both pushes. No vertex moves
+        # less far down than the weaker of its two pushes would move it alone.
         away = np.hypot(plain[:, 0], plain[:, 2]) > 17
         assert np.abs(posed[away] - linear[away]).max() < 1e-3
         least = np.min([push(plain, *PUSHES[name])[:, 1] for name in names], axis=0)

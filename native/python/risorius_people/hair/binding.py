@@ -239,8 +239,9 @@ def bind(
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
     """bool[n]: whether a place stays still relative to the head joint.
 
-    A place does if all controls except those of head and neck move it by less than `least`, and if
-    its weights of joints other than the head joint and its descendants are negligible.
+    A place stays still if each control, except the controls of head and neck, moves it by less than
+    `least`, and if its weights of joints other than the head joint and its descendants are
+    negligible.
 
     Args:
         dna: the face.

@@ -179,7 +179,8 @@ def _rig(
         say.line("searching again for faults, in the face of joints and shapes")
         rig.dna = correct_again(rig.dna, source, asked, say)
     if options.lighter:
-        lighten(rig, source)  # limits deltas to those of the input; found correctives are not input
+        # Allows as many deltas as `source` has, which lacks the correctives that were found.
+        lighten(rig, source)
     if read.template is not None:
         copy_maps(read.template, rig.dna)
     return dna, rig

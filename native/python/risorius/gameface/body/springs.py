@@ -44,8 +44,8 @@ class _Reader:
         self._down = np.diag(body.to_scene)[:3] / body.scale * flip
 
     def new(self, table: Mapping[str, Any]) -> Springs:
-        """Read the chains from VRM 1.0's table VRMC_springBone. The numbers of a chain, such as its
-        stiffness, are those of its first joint, although VRM allows others for each joint."""
+        """Read the chains from VRM 1.0's table VRMC_springBone. A chain takes its numbers,
+        such as the stiffness, from its first joint, although VRM lets each joint have its own."""
         at = "VRMC_springBone"
         colliders = [
             self._collider(row, f"{at}.colliders[{i}]")
