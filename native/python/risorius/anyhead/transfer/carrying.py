@@ -14,7 +14,7 @@ import numpy as np
 from ...author.geometry.rigid import rigid_way
 from ...author.geometry.skeleton import Doubles
 from ..form.teeth import JawChange
-from .closing import BLINKS, closing_shares, closing_shift
+from .closing import BLINKS, closing_shares, closing_shift, lids_that_meet
 from .form import changes_of_form, softened
 from .template import Pose, TemplateFace, left_over
 
@@ -55,11 +55,21 @@ class Carrying:
         self._shifts: dict[str, Doubles] = {}
         for control in BLINKS:
             if (control,) in face.ways:
-                shares = closing_shares(face, points, control, self.carried((control,)))
-                if shares is not None:
-                    self._closing[control] = shares
-                    way = self.carried((control,))
-                    self._shifts[control] = closing_shift(face, points, control, way)
+                self._close(control)
+
+    def _close(self, control: str) -> None:
+        """Compute the correction of a blink.
+
+        Args:
+            control: name of the blink's control.
+        """
+        face, points = self._face, self._points
+        pairs = lids_that_meet(face.surface, face.ways[(control,)].astype(np.float64))
+        if len(pairs[0]):
+            way = self.carried((control,))
+            self._closing[control] = closing_shares(face, points, control, way, pairs)
+            way = self.carried((control,))
+            self._shifts[control] = closing_shift(face, points, control, way, pairs)
 
     def _jaw_by_form(self, form: Doubles, trust: Doubles) -> JawChange | None:
         """The change of the jaw, estimated from the deformation of the skin that jawOpen moves.

@@ -50,20 +50,19 @@ def lids_that_meet(surface: Surface, way: Doubles) -> tuple[Ints, Ints]:
 
 
 def closing_shares(
-    face: TemplateFace, points: Doubles, control: str, carried: Doubles
-) -> Doubles | None:
-    """float64[V, 1]: factor of a blink's motion at each vertex; None if no lids meet.
+    face: TemplateFace, points: Doubles, control: str, carried: Doubles, pairs: tuple[Ints, Ints]
+) -> Doubles:
+    """float64[V, 1]: factor of a blink's motion at each vertex.
 
     Args:
         face: the template.
         points: float64[V, 3], positions of its vertices on the other head.
         control: name of the blink's control.
         carried: float64[V, 3], the blink on the other head before this correction.
+        pairs: the result of lids_that_meet for this blink of the template, with at least one pair.
     """
     surface, way = face.surface, face.ways[(control,)].astype(np.float64)
-    one, other = lids_that_meet(surface, way)
-    if not len(one):
-        return None
+    one, other = pairs
     posed = surface.points + way
     left = (posed[one] - posed[other]) - (points[one] - points[other])
     closes = carried[one] - carried[other]
@@ -76,7 +75,9 @@ def closing_shares(
     return out
 
 
-def closing_shift(face: TemplateFace, points: Doubles, control: str, carried: Doubles) -> Doubles:
+def closing_shift(
+    face: TemplateFace, points: Doubles, control: str, carried: Doubles, pairs: tuple[Ints, Ints]
+) -> Doubles:
     """float64[V, 3]: displacement to add to a blink, so that lids that meet on the template meet.
 
     Of two points that meet, the point that moves farther gets the larger part of the displacement.
@@ -86,12 +87,11 @@ def closing_shift(face: TemplateFace, points: Doubles, control: str, carried: Do
         points: float64[V, 3], positions of its vertices on the other head.
         control: name of the blink's control.
         carried: float64[V, 3], the blink on the other head before this correction.
+        pairs: the result of lids_that_meet for this blink of the template, with at least one pair.
     """
     surface, way = face.surface, face.ways[(control,)].astype(np.float64)
-    one, other = lids_that_meet(surface, way)
+    one, other = pairs
     out = np.zeros_like(points)
-    if not len(one):
-        return out
     posed, there = surface.points + way, points + carried
     left = (posed[one] - posed[other]) - (there[one] - there[other])
     far = [np.square(carried[pair]).sum(axis=1) for pair in (one, other)]
